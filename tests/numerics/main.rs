@@ -1,0 +1,8 @@
+//! Unit tests of the numerics, one file for each file or folder of `core/src`.
+//!
+//! Contract: every test can fail; a check of derivatives first makes sure that the derivative is not zero. Units: mm, kPa.
+//!
+//! Not here: laws of whole answers and closed forms of mechanics, which have tiers of their own.
+
+mod needle;
+mod tissue;
