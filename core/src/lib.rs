@@ -4,5 +4,8 @@
 //! surface, +z out of the tissue into the vitreous. This crate does no I/O, reads no clock and spawns no thread.
 
 pub mod needle;
+pub mod patch;
 pub mod range;
+pub mod scene;
+pub mod surface;
 pub mod tissue;

@@ -4,5 +4,10 @@
 //!
 //! Not here: laws of whole answers and closed forms of mechanics, which have tiers of their own.
 
+mod mesh_file;
+mod meshes;
 mod needle;
+mod patch;
+mod scene;
+mod surface;
 mod tissue;

@@ -3,6 +3,8 @@
 use nalgebra::{Matrix3, Point3, Unit, UnitQuaternion, Vector3};
 use retina_core::needle::{Body, Gauge, Needle, NeedleShape, Tip, orientation_pointing};
 
+use crate::meshes::noise;
+
 fn shapes(radius: f64) -> Vec<NeedleShape> {
     let bevel = |angle_deg, edge| NeedleShape {
         radius_mm: radius,
@@ -25,17 +27,6 @@ fn shapes(radius: f64) -> Vec<NeedleShape> {
         bevel(75.0, 0.5),
         bevel(45.0, 1.0),
     ]
-}
-
-/// Repeatable numbers in −1 to 1.
-fn noise(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
 }
 
 /// Whether the second derivative stays nearly what it is at `p` up to `h` away: differences across a jump of it prove nothing.
