@@ -1,0 +1,281 @@
+//! The sum of effects over their groups: energy, gradient and Hessian of the whole system, written once.
+//!
+//! The unknowns are the free degrees of freedom of the vertices (numbered by [`Dofs`]) and, as a border, the three coordinates
+//! of at most one driven vertex (the needle). The Hessian of the free part is sparse and symmetric (its lower triangle is kept,
+//! compressed by columns); the border is dense. All of it lies in one flat array of values, and [`Pattern`] knows for each entry of each
+//! local Hessian where it goes, so that assembly is a loop of additions.
+//! Not here: what the energies are, how the system is solved.
+
+use crate::effect::{Local, Stencils, Term};
+
+/// Marks a fixed degree of freedom.
+const FIXED: u32 = u32::MAX;
+/// The border's three degrees of freedom are `BORDER`, `BORDER + 1`, `BORDER + 2`.
+const BORDER: u32 = u32::MAX - 3;
+/// Marks a pair that is not stored.
+const SKIP: u32 = u32::MAX;
+
+/// Numbering of the degrees of freedom.
+#[derive(Clone, Debug)]
+pub struct Dofs {
+    /// For each vertex and component: number of the free unknown, `BORDER + k` or `FIXED`.
+    of: Vec<u32>,
+    /// Number of free unknowns.
+    pub free: usize,
+}
+
+impl Dofs {
+    /// Numbers the free components in the order of `vertex_order`; `fixed` tells which (vertex, component) do not move, and
+    /// `border` which vertex is driven.
+    pub fn new(
+        vertices: usize,
+        vertex_order: impl IntoIterator<Item = usize>,
+        fixed: impl Fn(usize, usize) -> bool,
+        border: Option<usize>,
+    ) -> Self {
+        let mut of = vec![FIXED; 3 * vertices];
+        let mut free = 0;
+        for vertex in vertex_order {
+            for component in 0..3 {
+                if Some(vertex) != border && !fixed(vertex, component) {
+                    of[3 * vertex + component] = free;
+                    free += 1;
+                }
+            }
+        }
+        if let Some(vertex) = border {
+            for component in 0..3 {
+                of[3 * vertex + component] = BORDER + component as u32;
+            }
+        }
+        Dofs { of, free: free as usize }
+    }
+
+    /// Index of a (vertex, component) in a vector of free unknowns followed by the three of the border; `None` if fixed.
+    pub fn index(&self, vertex: usize, component: usize) -> Option<usize> {
+        match self.of[3 * vertex + component] {
+            FIXED => None,
+            dof if dof >= BORDER => Some(self.free + (dof - BORDER) as usize),
+            dof => Some(dof as usize),
+        }
+    }
+
+    /// Adds `scale` × `step` (free unknowns, then the border) to the positions.
+    pub fn advance(&self, positions: &mut [f64], step: &[f64], scale: f64) {
+        for (at, position) in positions.iter_mut().enumerate() {
+            if let Some(index) = self.index(at / 3, at % 3) {
+                *position += scale * step[index];
+            }
+        }
+    }
+}
+
+/// Sparsity of the Hessian and the destination of every local entry.
+#[derive(Clone, Debug)]
+pub struct Pattern {
+    /// Number of free unknowns.
+    pub free: usize,
+    /// Column starts of the lower triangle.
+    pub column_starts: Vec<u32>,
+    /// Row indices, ascending in each column.
+    pub rows: Vec<u32>,
+    /// For each stencil set: destination of the lower-triangle entries of each group's Hessian, row by row.
+    destinations: Vec<Vec<u32>>,
+}
+
+impl Pattern {
+    /// The pattern for effects on these stencil sets (in this order in every later call).
+    pub fn new(dofs: &Dofs, stencils: &[&Stencils]) -> Self {
+        let free = dofs.free;
+        let mut columns: Vec<Vec<u32>> = vec![Vec::new(); free];
+        let locals = |set: &Stencils, group: usize| -> Vec<u32> {
+            let vertices = set.group(group);
+            (0..3).flat_map(|k| vertices.iter().map(move |&v| dofs.of[3 * v as usize + k])).collect()
+        };
+        for set in stencils {
+            for group in 0..set.len() {
+                let mut dofs: Vec<u32> = locals(set, group).into_iter().filter(|&d| d < BORDER).collect();
+                dofs.sort_unstable();
+                for (at, &column) in dofs.iter().enumerate() {
+                    columns[column as usize].extend_from_slice(&dofs[at..]);
+                }
+            }
+            for column in &mut columns {
+                column.sort_unstable();
+                column.dedup();
+            }
+        }
+        let mut column_starts = vec![0u32];
+        let mut rows = Vec::new();
+        for column in &columns {
+            rows.extend_from_slice(column);
+            column_starts.push(rows.len() as u32);
+        }
+        let stored = rows.len() as u32;
+        let destination = |a: u32, b: u32| -> u32 {
+            let (low, high) = (a.min(b), a.max(b));
+            if high == FIXED {
+                SKIP
+            } else if low >= BORDER {
+                stored + 3 * free as u32 + 3 * (high - BORDER) + (low - BORDER)
+            } else if high >= BORDER {
+                stored + (high - BORDER) * free as u32 + low
+            } else {
+                let column = &columns[low as usize];
+                column_starts[low as usize] + column.binary_search(&high).map_or(SKIP, |at| at as u32)
+            }
+        };
+        let destinations = stencils
+            .iter()
+            .map(|set| {
+                let mut list = Vec::new();
+                for group in 0..set.len() {
+                    let dofs = locals(set, group);
+                    for row in 0..dofs.len() {
+                        list.extend((0..=row).map(|column| destination(dofs[row], dofs[column])));
+                    }
+                }
+                list
+            })
+            .collect();
+        Pattern { free, column_starts, rows, destinations }
+    }
+
+    /// Number of stored entries of the sparse lower triangle.
+    pub fn stored(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Length of the array of values: sparse part, border (3 × free), corner (3 × 3, lower triangle).
+    pub fn len(&self) -> usize {
+        self.rows.len() + 3 * self.free + 9
+    }
+
+    /// Whether there is no unknown.
+    pub fn is_empty(&self) -> bool {
+        self.free == 0
+    }
+}
+
+/// Memory for assembly, reused between evaluations.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    positions: Vec<f64>,
+    other: Vec<f64>,
+    hessian: Vec<f64>,
+}
+
+/// Predicted stresses of every group of every term; [`Predicted::default`] stands for those of the current positions.
+#[derive(Clone, Debug, Default)]
+pub struct Predicted {
+    /// One vector per term, group after group.
+    terms: Vec<Vec<f64>>,
+}
+
+impl Predicted {
+    /// No stress anywhere.
+    pub fn zero(terms: &[Term]) -> Self {
+        Predicted { terms: terms.iter().map(|t| vec![0.0; t.effect.predicted_len() * t.stencils.len()]).collect() }
+    }
+
+    fn of(&self, term: usize, group: usize, len: usize) -> &[f64] {
+        self.terms.get(term).map_or(&[], |stresses| &stresses[group * len..(group + 1) * len])
+    }
+}
+
+/// Fills `out` with the stresses at the end of the linear step `step` (layout of positions) from `positions`.
+pub fn predict_stress(terms: &[Term], positions: &[f64], step: &[f64], scratch: &mut Scratch, out: &mut Predicted) {
+    for stresses in &mut out.terms {
+        stresses.fill(0.0);
+    }
+    for_each_active(terms, positions, &Predicted::default(), scratch, |index, term, local, moved, _| {
+        let len = term.effect.predicted_len();
+        moved.resize(3 * term.stencils.group_size, 0.0);
+        term.stencils.gather(local.group, step, moved);
+        term.effect.predict_stress(local, moved, &mut out.terms[index][local.group * len..(local.group + 1) * len]);
+    });
+}
+
+/// Calls `visit(term index, term, local, scratch)` for each active group of each term.
+fn for_each_active(
+    terms: &[Term],
+    positions: &[f64],
+    predicted: &Predicted,
+    scratch: &mut Scratch,
+    mut visit: impl FnMut(usize, &Term, &Local, &mut Vec<f64>, &mut Vec<f64>),
+) {
+    let Scratch { positions: current, other, hessian } = scratch;
+    for (index, term) in terms.iter().enumerate() {
+        current.resize(3 * term.stencils.group_size, 0.0);
+        for group in 0..term.stencils.len() {
+            term.stencils.gather(group, positions, current);
+            let local = Local { current, group, predicted: predicted.of(index, group, term.effect.predicted_len()) };
+            if term.effect.is_active(&local) {
+                visit(index, term, &local, other, hessian);
+            }
+        }
+    }
+}
+
+/// Total energy [µJ] at `positions` (x, y, z of each vertex); infinite if any effect vetoes them.
+pub fn energy(terms: &[Term], positions: &[f64], scratch: &mut Scratch) -> f64 {
+    let mut total = 0.0;
+    for_each_active(terms, positions, &Predicted::default(), scratch, |_, term, local, _, _| total += term.effect.energy(local));
+    total
+}
+
+/// The gradient [mN] with respect to the free unknowns, then to the three border coordinates (`out`: free + 3 entries).
+pub fn gradient(terms: &[Term], positions: &[f64], dofs: &Dofs, scratch: &mut Scratch, out: &mut [f64]) {
+    out.fill(0.0);
+    for_each_active(terms, positions, &Predicted::default(), scratch, |_, term, local, forces, _| {
+        let n = term.stencils.group_size;
+        forces.clear();
+        forces.resize(3 * n, 0.0);
+        term.effect.add_gradient(local, forces);
+        for (a, &vertex) in term.stencils.group(local.group).iter().enumerate() {
+            for component in 0..3 {
+                if let Some(index) = dofs.index(vertex as usize, component) {
+                    out[index] += forces[component * n + a];
+                }
+            }
+        }
+    });
+}
+
+/// The Hessian [mN/mm] in the layout of `pattern` (`values`: `pattern.len()` entries).
+pub fn hessian(
+    terms: &[Term],
+    positions: &[f64],
+    predicted: &Predicted,
+    pattern: &Pattern,
+    scratch: &mut Scratch,
+    values: &mut [f64],
+) {
+    values.fill(0.0);
+    for_each_active(terms, positions, predicted, scratch, |index, term, local, _, matrix| {
+        let n = 3 * term.stencils.group_size;
+        matrix.clear();
+        matrix.resize(n * n, 0.0);
+        term.effect.add_hessian(local, matrix);
+        let per_group = n * (n + 1) / 2;
+        let mut destinations = pattern.destinations[index][local.group * per_group..][..per_group].iter();
+        for row in 0..n {
+            for (value, &destination) in matrix[row * n..=row * n + row].iter().zip(&mut destinations) {
+                if destination != SKIP {
+                    values[destination as usize] += value;
+                }
+            }
+        }
+    });
+}
+
+/// The largest fraction of `step` (same layout as positions) that every effect accepts.
+pub fn max_step(terms: &[Term], positions: &[f64], step: &[f64], scratch: &mut Scratch) -> f64 {
+    let mut largest = 1.0_f64;
+    for_each_active(terms, positions, &Predicted::default(), scratch, |_, term, local, moved, _| {
+        moved.resize(3 * term.stencils.group_size, 0.0);
+        term.stencils.gather(local.group, step, moved);
+        largest = largest.min(term.effect.max_step(local, moved));
+    });
+    largest
+}

@@ -1,0 +1,103 @@
+//! The contract of an effect: what it adds to the potential on one small group of vertices.
+//!
+//! "Who interacts" is data ([`Stencils`]), "with what energy" is code ([`Effect`]); the sum over groups is written once, in
+//! [`crate::assemble`]. Energies are functions of the positions handed in and of nothing else that changes, so the solver may
+//! evaluate them wherever it likes. Units: mm, mN, µJ.
+//!
+//! Local vectors are component-major: the x of every vertex of the group, then every y, then every z, so that inner loops run
+//! over contiguous numbers. A local Hessian is a dense row-major square in the same order, of which only the lower triangle
+//! (column ≤ row) is read.
+
+/// One group of vertices, as an effect sees it. All slices have length 3 × vertices of the group, component-major.
+#[derive(Clone, Copy, Debug)]
+pub struct Local<'a> {
+    /// Current positions [mm].
+    pub current: &'a [f64],
+    /// Index of the group among the effect's stencils.
+    pub group: usize,
+    /// Stresses of this group as the last linear step predicted them ([`Effect::predict_stress`]), for the Hessian's
+    /// stress-dependent part; empty: the stresses of `current`.
+    pub predicted: &'a [f64],
+}
+
+/// An energy on small groups of vertices.
+pub trait Effect: Send + Sync {
+    /// The name under which reports and errors mention the effect.
+    fn name(&self) -> &'static str;
+
+    /// `false` promises that energy, gradient and Hessian of this group are all zero at these positions.
+    fn is_active(&self, _local: &Local) -> bool {
+        true
+    }
+
+    /// Energy [µJ]; infinite where the position must not be accepted (an inverted element).
+    fn energy(&self, local: &Local) -> f64;
+
+    /// Adds ∂energy/∂position [mN] to `out`.
+    fn add_gradient(&self, local: &Local, out: &mut [f64]);
+
+    /// Adds ∂²energy/∂position² [mN/mm] to the lower triangle of `out`.
+    fn add_hessian(&self, local: &Local, out: &mut [f64]);
+
+    /// How many predicted stresses a group has (0: the effect has no stiff stresses worth predicting).
+    fn predicted_len(&self) -> usize {
+        0
+    }
+
+    /// The stresses at the end of the linear step `step` from `current`, to first order, into `out`.
+    ///
+    /// Stiff stresses (the pressure of a nearly incompressible solid, a penalty's contact pressure) evaluated after a large step are far off,
+    /// and their geometric stiffness spoils the next one. Their first-order prediction is what a formulation with independent stresses
+    /// would carry along (mixed integration point Newton: Magisano, Leonetti & Garcea, *Int. J. Numer. Meth. Engng* 2017).
+    fn predict_stress(&self, _local: &Local, _step: &[f64], _out: &mut [f64]) {}
+
+    /// The largest fraction of `step` (positions change by `step`) that keeps the effect meaningful, in (0, 1].
+    fn max_step(&self, _local: &Local, _step: &[f64]) -> f64 {
+        1.0
+    }
+}
+
+/// Groups of equally many vertices.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stencils {
+    /// Vertices in each group.
+    pub group_size: usize,
+    /// Vertex indices, group after group.
+    pub vertices: Vec<u32>,
+}
+
+impl Stencils {
+    /// Number of groups.
+    pub fn len(&self) -> usize {
+        self.vertices.len() / self.group_size
+    }
+
+    /// Whether there is no group.
+    pub fn is_empty(&self) -> bool {
+        self.vertices.is_empty()
+    }
+
+    /// The vertices of one group.
+    pub fn group(&self, index: usize) -> &[u32] {
+        &self.vertices[index * self.group_size..(index + 1) * self.group_size]
+    }
+
+    /// Copies the positions of one group, component-major, into `out` (length 3 × group size).
+    pub fn gather(&self, index: usize, positions: &[f64], out: &mut [f64]) {
+        let n = self.group_size;
+        for (a, &vertex) in self.group(index).iter().enumerate() {
+            let at = 3 * vertex as usize;
+            out[a] = positions[at];
+            out[n + a] = positions[at + 1];
+            out[2 * n + a] = positions[at + 2];
+        }
+    }
+}
+
+/// An effect and the groups on which it acts.
+pub struct Term<'a> {
+    /// The energy.
+    pub effect: &'a dyn Effect,
+    /// Where it acts.
+    pub stencils: &'a Stencils,
+}

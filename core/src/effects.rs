@@ -1,0 +1,9 @@
+//! The effects, one file each. A new one is one file here, one line below and one row in the derivative check.
+
+pub mod contact;
+pub mod elasticity;
+pub mod finite_strain;
+pub mod solid;
+
+/// Names of every effect, in the order in which reports list them.
+pub const EFFECT_NAMES: [&str; 3] = [elasticity::NAME, finite_strain::NAME, contact::NAME];

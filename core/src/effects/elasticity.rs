@@ -1,0 +1,128 @@
+//! `elasticity`: small-strain isotropic elasticity, free of volumetric locking.
+//!
+//! Energy per rest volume µ ε:ε + λ/2 ϑ², with ε the symmetric part of the displacement gradient H = F − 1 and ϑ its trace
+//! projected on the element's pressure modes. Quadratic in the positions, so its Hessian is constant: the linearisation of
+//! [`super::finite_strain`] at rest, to which it is compared in the derivative checks.
+
+use nalgebra::Matrix3;
+
+use super::finite_strain::Lame;
+use super::solid::{ElementKernel, SolidGeometry, StiffnessCoefficients, run_kernel};
+use crate::effect::{Effect, Local};
+use crate::mesh::element::{NODES, POINTS};
+
+/// Name of the effect.
+pub const NAME: &str = "elasticity";
+
+/// The effect on a set of elements.
+pub struct Elasticity<'a> {
+    /// Rest geometry of the elements.
+    pub geometry: &'a SolidGeometry,
+    /// Material of each element.
+    pub materials: &'a [Lame],
+}
+
+impl Elasticity<'_> {
+    /// Strain at the quadrature points and its projected trace.
+    #[inline(always)]
+    fn strains(&self, local: &Local) -> ([Matrix3<f64>; POINTS], [f64; POINTS]) {
+        let mut strain = [Matrix3::zeros(); POINTS];
+        let mut trace = [0.0; POINTS];
+        for q in 0..POINTS {
+            let h = self.geometry.deformation_gradient(local.group, q, local.current) - Matrix3::identity();
+            strain[q] = (h + h.transpose()) * 0.5;
+            trace[q] = h.trace();
+        }
+        (strain, self.geometry.project(local.group, &trace))
+    }
+
+    #[inline(always)]
+    fn energy_n(&self, local: &Local) -> f64 {
+        let (strain, trace) = self.strains(local);
+        let material = &self.materials[local.group];
+        let weights = self.geometry.weights(local.group).iter();
+        weights
+            .enumerate()
+            .map(|(q, w)| w * (material.mu * strain[q].norm_squared() + 0.5 * material.lambda * trace[q] * trace[q]))
+            .sum()
+    }
+
+    #[inline(always)]
+    fn add_gradient_n(&self, local: &Local, out: &mut [f64]) {
+        let (strain, trace) = self.strains(local);
+        let material = &self.materials[local.group];
+        let mut stress = [Matrix3::zeros(); POINTS];
+        for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
+            // The projection is self-adjoint and idempotent: the stress needs no second projection.
+            stress[q] = (strain[q] * (2.0 * material.mu) + Matrix3::identity() * (material.lambda * trace[q])) * weight;
+        }
+        self.geometry.add_force(local.group, &stress, out);
+    }
+
+    #[inline(always)]
+    fn add_hessian_n(&self, local: &Local, out: &mut [f64]) {
+        let material = &self.materials[local.group];
+        let mut gradients = [[[0.0; NODES]; 3]; POINTS];
+        let mut coefficients = [StiffnessCoefficients::default(); POINTS];
+        let mut volumetric = [0.0; POINTS];
+        for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
+            gradients[q].copy_from_slice(self.geometry.gradients(local.group, q));
+            let shear = weight * material.mu;
+            coefficients[q] = StiffnessCoefficients { rest: shear, cross: shear, outer: 0.0 };
+            volumetric[q] = weight * material.lambda;
+        }
+        self.geometry.add_stiffness(local.group, &gradients, &coefficients, out);
+        self.geometry.add_volumetric_stiffness(local.group, &gradients, &volumetric, out);
+    }
+}
+
+struct Energy<'a>(&'a Elasticity<'a>, &'a Local<'a>);
+
+impl ElementKernel for Energy<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        self.0.energy_n(self.1)
+    }
+}
+
+struct Gradient<'a>(&'a Elasticity<'a>, &'a Local<'a>, &'a mut [f64]);
+
+impl ElementKernel for Gradient<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) -> () {
+        self.0.add_gradient_n(self.1, self.2)
+    }
+}
+
+struct Hessian<'a>(&'a Elasticity<'a>, &'a Local<'a>, &'a mut [f64]);
+
+impl ElementKernel for Hessian<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) -> () {
+        self.0.add_hessian_n(self.1, self.2)
+    }
+}
+
+impl Effect for Elasticity<'_> {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn energy(&self, local: &Local) -> f64 {
+        run_kernel(Energy(self, local))
+    }
+
+    fn add_gradient(&self, local: &Local, out: &mut [f64]) {
+        run_kernel(Gradient(self, local, out))
+    }
+
+    fn add_hessian(&self, local: &Local, out: &mut [f64]) {
+        run_kernel(Hessian(self, local, out))
+    }
+}

@@ -1,0 +1,273 @@
+//! What the solid effects share: the geometry of elements at rest, and the loops that turn point-wise stress and stiffness
+//! into element vectors and matrices.
+//!
+//! For a point energy W(F) whose second derivative has the form
+//! δᵢⱼ c_rest (Gₐ·G_b) + c_cross gₐⱼ g_bᵢ + c_outer gₐᵢ g_bⱼ, with G the rest gradients of the shape functions and g = F⁻ᵀG,
+//! the element matrix is a sum of outer products over quadrature points; [`SolidGeometry::add_stiffness`] is that sum.
+//! Loops have compile-time lengths and run under the widest vector instructions of the machine ([`run_kernel`]).
+//! Not here: any material, any mesh topology.
+
+use nalgebra::{Matrix3, Matrix4, Vector4};
+use thiserror::Error;
+
+use crate::effect::Stencils;
+use crate::mesh::element::{MODES, NODES, POINTS, quadrature};
+
+/// One number per node for each component: a row of shape function gradients.
+pub type NodeRows = [[f64; NODES]; 3];
+
+/// A mesh that cannot carry a solid.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum SolidGeometryError {
+    /// The rest Jacobian is not positive at a quadrature point.
+    #[error("element {element} is inverted or degenerate at rest (Jacobian {jacobian:e} mm³ at quadrature point {point})")]
+    Inverted {
+        /// Element index.
+        element: usize,
+        /// Quadrature point index.
+        point: usize,
+        /// The offending Jacobian determinant [mm³].
+        jacobian: f64,
+    },
+}
+
+/// Rest geometry of every element of a stencil set.
+#[derive(Clone, Debug)]
+pub struct SolidGeometry {
+    /// ∂N/∂X [1/mm], indexed (element, point).
+    gradients: Vec<NodeRows>,
+    /// Quadrature weight × rest Jacobian [mm³], indexed (element, point).
+    weights: Vec<f64>,
+    /// Pressure modes at the quadrature points of the reference element.
+    mode_values: [[f64; MODES]; POINTS],
+    /// Inverse of the rest-volume mass matrix of the pressure modes [1/mm³], one per element.
+    mode_inverse: Vec<Matrix4<f64>>,
+}
+
+impl SolidGeometry {
+    /// Geometry of `stencils` at the rest positions (x, y, z of each vertex) [mm].
+    ///
+    /// # Errors
+    /// If an element is inverted or flat at rest.
+    pub fn new(stencils: &Stencils, rest: &[f64]) -> Result<Self, SolidGeometryError> {
+        let reference = quadrature();
+        let elements = stencils.len();
+        let mut gradients = Vec::with_capacity(elements * POINTS);
+        let mut weights = Vec::with_capacity(elements * POINTS);
+        let mut mode_inverse = Vec::with_capacity(elements);
+        let mut local = [0.0; 3 * NODES];
+        for element in 0..elements {
+            stencils.gather(element, rest, &mut local);
+            let mut mass = Matrix4::zeros();
+            for (index, point) in reference.iter().enumerate() {
+                let jacobian = Matrix3::from_fn(|i, k| {
+                    (0..NODES).map(|a| local[i * NODES + a] * point.shapes[a].gradient[k]).sum()
+                });
+                let determinant = jacobian.determinant();
+                let inverted = SolidGeometryError::Inverted { element, point: index, jacobian: determinant };
+                let inverse = jacobian.try_inverse().filter(|_| determinant > 0.0).ok_or(inverted)?;
+                gradients.push([0, 1, 2].map(|k| {
+                    let row = point.shapes.map(|s| s.gradient);
+                    row.map(|g| (0..3).map(|l| g[l] * inverse[(l, k)]).sum::<f64>())
+                }));
+                let weight = point.weight * determinant;
+                weights.push(weight);
+                mass += Matrix4::from_fn(|i, j| weight * point.modes[i] * point.modes[j]);
+            }
+            let inverted = SolidGeometryError::Inverted { element, point: 0, jacobian: mass[(0, 0)] };
+            mode_inverse.push(mass.try_inverse().ok_or(inverted)?);
+        }
+        let mut mode_values = [[0.0; MODES]; POINTS];
+        for (values, point) in mode_values.iter_mut().zip(&reference) {
+            *values = point.modes;
+        }
+        Ok(SolidGeometry { gradients, weights, mode_values, mode_inverse })
+    }
+
+    /// Rest gradients of the shape functions at one point: three rows (x, y, z) of one number per node [1/mm].
+    #[inline(always)]
+    pub fn gradients(&self, element: usize, point: usize) -> &NodeRows {
+        &self.gradients[element * POINTS + point]
+    }
+
+    /// Quadrature weights × rest Jacobian of one element [mm³].
+    #[inline(always)]
+    pub fn weights(&self, element: usize) -> &[f64] {
+        &self.weights[element * POINTS..(element + 1) * POINTS]
+    }
+
+    /// Deformation gradient F = Σ xₐ ⊗ Gₐ at one point.
+    #[inline(always)]
+    pub fn deformation_gradient(&self, element: usize, point: usize, current: &[f64]) -> Matrix3<f64> {
+        let gradients = self.gradients(element, point);
+        let position = current.as_chunks::<NODES>().0;
+        Matrix3::from_fn(|i, k| dot(&position[i], &gradients[k]))
+    }
+
+    /// Projects point values on the pressure modes and back: the value of the projection at every point.
+    ///
+    /// With M the mass matrix of the modes this is φ(q)·M⁻¹ Σ_r w_r φ(r) v_r, which keeps ∫v.
+    #[inline(always)]
+    pub fn project(&self, element: usize, values: &[f64; POINTS]) -> [f64; POINTS] {
+        let coefficients = self.mode_inverse[element] * self.mode_integral(element, values);
+        let mut out = [0.0; POINTS];
+        for (value, modes) in out.iter_mut().zip(&self.mode_values) {
+            *value = (0..MODES).map(|m| modes[m] * coefficients[m]).sum();
+        }
+        out
+    }
+
+    /// ∫ v φₘ over the element, for each pressure mode.
+    #[inline(always)]
+    fn mode_integral(&self, element: usize, values: &[f64; POINTS]) -> Vector4<f64> {
+        let mut integral = Vector4::zeros();
+        for ((value, weight), modes) in values.iter().zip(self.weights(element)).zip(&self.mode_values) {
+            for m in 0..MODES {
+                integral[m] += weight * value * modes[m];
+            }
+        }
+        integral
+    }
+
+    /// Adds Σ_q Gᵀ·stress: `stress[q]` is the first Piola–Kirchhoff stress times the quadrature weight [mN·mm].
+    #[inline(always)]
+    pub fn add_force(&self, element: usize, stress: &[Matrix3<f64>; POINTS], out: &mut [f64]) {
+        let rows = out.as_chunks_mut::<NODES>().0;
+        for (q, p) in stress.iter().enumerate().take(POINTS) {
+            let g = self.gradients(element, q);
+            for i in 0..3 {
+                for a in 0..NODES {
+                    rows[i][a] += p[(i, 0)] * g[0][a] + p[(i, 1)] * g[1][a] + p[(i, 2)] * g[2][a];
+                }
+            }
+        }
+    }
+
+    /// Adds the point-wise part of the element matrix (lower triangle) for the given coefficients, quadrature weight included.
+    #[inline(always)]
+    pub fn add_stiffness(
+        &self,
+        element: usize,
+        spatial: &[NodeRows; POINTS],
+        coefficients: &[StiffnessCoefficients; POINTS],
+        out: &mut [f64],
+    ) {
+        let rows = out.as_chunks_mut::<NODES>().0;
+        for a in 0..NODES {
+            let mut isotropic = [0.0; NODES];
+            for q in 0..POINTS {
+                let rest = self.gradients(element, q);
+                for row in rest {
+                    let scale = coefficients[q].rest * row[a];
+                    for b in 0..NODES {
+                        isotropic[b] = row[b].mul_add(scale, isotropic[b]);
+                    }
+                }
+            }
+            for i in 0..3 {
+                for j in 0..=i {
+                    let mut sum = if i == j { isotropic } else { [0.0; NODES] };
+                    for q in 0..POINTS {
+                        let (gi, gj) = (&spatial[q][i], &spatial[q][j]);
+                        let cross = coefficients[q].cross * gj[a];
+                        let outer = coefficients[q].outer * gi[a];
+                        for b in 0..NODES {
+                            sum[b] = gi[b].mul_add(cross, gj[b].mul_add(outer, sum[b]));
+                        }
+                    }
+                    let row = &mut rows[(i * NODES + a) * 3 + j];
+                    for b in 0..NODES {
+                        row[b] += sum[b];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds the volumetric part of the element matrix (lower triangle): Σ_q w U″(θ_q) ∇θ_q ⊗ ∇θ_q, with θ the projected
+    /// dilatation whose gradient at the points is `dilatation_gradient` (∂J/∂x) and `stiffness[q]` = w U″.
+    #[inline(always)]
+    pub fn add_volumetric_stiffness(
+        &self,
+        element: usize,
+        dilatation_gradient: &[NodeRows; POINTS],
+        stiffness: &[f64; POINTS],
+        out: &mut [f64],
+    ) {
+        let mut integrals = [[[0.0; NODES]; 3]; MODES];
+        let mut core = Matrix4::zeros();
+        for (q, weight) in self.weights(element).iter().enumerate() {
+            let modes = &self.mode_values[q];
+            for m in 0..MODES {
+                for k in 0..3 {
+                    for a in 0..NODES {
+                        integrals[m][k][a] += weight * modes[m] * dilatation_gradient[q][k][a];
+                    }
+                }
+                for l in 0..MODES {
+                    core[(m, l)] += stiffness[q] * modes[m] * modes[l];
+                }
+            }
+        }
+        let core = self.mode_inverse[element] * core * self.mode_inverse[element];
+        let rows = out.as_chunks_mut::<NODES>().0;
+        for i in 0..3 {
+            for a in 0..NODES {
+                for m in 0..MODES {
+                    let scale: f64 = (0..MODES).map(|l| core[(m, l)] * integrals[l][i][a]).sum();
+                    for j in 0..=i {
+                        let row = &mut rows[(i * NODES + a) * 3 + j];
+                        for b in 0..NODES {
+                            row[b] = integrals[m][j][b].mul_add(scale, row[b]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Coefficients of the point-wise stiffness, quadrature weight included [mN·mm].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StiffnessCoefficients {
+    /// Multiplies δᵢⱼ Gₐ·G_b.
+    pub rest: f64,
+    /// Multiplies gₐⱼ g_bᵢ.
+    pub cross: f64,
+    /// Multiplies gₐᵢ g_bⱼ.
+    pub outer: f64,
+}
+
+#[inline(always)]
+fn dot(a: &[f64; NODES], b: &[f64; NODES]) -> f64 {
+    let mut sum = 0.0;
+    for k in 0..NODES {
+        sum += a[k] * b[k];
+    }
+    sum
+}
+
+/// A computation on one element. A trait and not a closure: a closure that is not inlined loses the vector instructions.
+pub(super) trait ElementKernel {
+    /// What it returns.
+    type Output;
+
+    /// Runs it. Implementations and all that they call are `#[inline(always)]`.
+    fn run(self) -> Self::Output;
+}
+
+struct Dispatched<K>(K);
+
+impl<K: ElementKernel> pulp::WithSimd for Dispatched<K> {
+    type Output = K::Output;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _simd: S) -> K::Output {
+        self.0.run()
+    }
+}
+
+/// Runs `kernel` under the machine's widest vector instructions.
+pub(super) fn run_kernel<K: ElementKernel>(kernel: K) -> K::Output {
+    pulp::Arch::new().dispatch(Dispatched(kernel))
+}

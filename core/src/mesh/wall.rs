@@ -1,0 +1,223 @@
+//! The eye wall under the disc: quadrilaterals extruded through the tissue layers.
+//!
+//! [`WallTopology`] is what depends on counts alone (vertices, elements, faces, unknowns, sparsity, symbolic factorisation) and is
+//! made once per level and number of layers; [`WallGeometry`] is one contact's rest positions. Vertices are numbered in elimination order. The
+//! outer face of the sclera and the rim do not move; the needle is one more vertex, after all others.
+
+use std::collections::HashMap;
+
+use thiserror::Error;
+
+use super::disc::{DiscGeometry, DiscTopology};
+use super::element::{NODES, ORDER, node_offsets, top_nodes};
+use super::ordering::nested_dissection;
+use crate::assemble::{Dofs, Pattern};
+use crate::effect::Stencils;
+use crate::effects::solid::{SolidGeometry, SolidGeometryError};
+use crate::solve::sparse::{LinearSolveError, SymbolicFactor};
+use crate::surface::Column;
+
+/// How finely the wall is divided.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct WallDivision {
+    /// Cells along each edge of the core.
+    pub core_cells: usize,
+    /// Rings around the core.
+    pub rings: usize,
+    /// Elements through each tissue layer, inner layer first.
+    pub elements_per_layer: Vec<usize>,
+}
+
+/// A mesh that could not be made.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum WallError {
+    /// The surface and layers leave no room for an element.
+    #[error("the tissue cannot be meshed here: {0}")]
+    Geometry(#[from] SolidGeometryError),
+    /// The sparsity pattern was not analysed.
+    #[error(transparent)]
+    Linear(#[from] LinearSolveError),
+}
+
+/// Everything that depends on the division alone.
+#[derive(Debug)]
+pub struct WallTopology {
+    /// The division it was made for.
+    pub division: WallDivision,
+    /// The disc's topology.
+    pub disc: DiscTopology,
+    /// The elements.
+    pub elements: Stencils,
+    /// Tissue layer of each element, inner layer 0.
+    pub element_layer: Vec<usize>,
+    /// Inner-surface faces: face nodes, then the needle.
+    pub faces: Stencils,
+    /// For each disc cell, its face's vertices in face-node order.
+    pub face_points: Vec<Vec<usize>>,
+    /// For each vertex (without the needle): its lattice point of the disc and its level (0 at the base).
+    pub vertices: Vec<(usize, usize)>,
+    /// Unknowns.
+    pub dofs: Dofs,
+    /// Sparsity of solid and contact terms, in this order.
+    pub pattern: Pattern,
+    /// The analysed factorisation.
+    pub symbolic: SymbolicFactor,
+}
+
+impl WallTopology {
+    /// Builds the topology of `division`.
+    ///
+    /// # Errors
+    /// If the sparsity pattern cannot be analysed.
+    pub fn new(division: WallDivision) -> Result<Self, WallError> {
+        let disc = DiscTopology { core_cells: division.core_cells, rings: division.rings };
+        let cells = disc.cells();
+        let layers: Vec<usize> = division
+            .elements_per_layer
+            .iter()
+            .enumerate()
+            .rev()
+            .flat_map(|(layer, &count)| std::iter::repeat_n(layer, count))
+            .collect();
+
+        let offsets = node_offsets();
+        let lattice = |cell: &[usize], layer: usize, [i, j, k]: [usize; 3]| {
+            (cell[j * (ORDER + 1) + i], layer * ORDER + k)
+        };
+        let mut used: HashMap<usize, Vec<usize>> = HashMap::new();
+        for cell in &cells {
+            for layer in 0..layers.len() {
+                for &offset in &offsets {
+                    let (point, level) = lattice(cell, layer, offset);
+                    used.entry(point).or_default().push(level);
+                }
+            }
+        }
+        let mut vertices = Vec::new();
+        let mut index = HashMap::new();
+        for point in nested_dissection(&disc) {
+            let mut levels = used.remove(&point).unwrap_or_default();
+            levels.sort_unstable();
+            levels.dedup();
+            for level in levels {
+                index.insert((point, level), vertices.len());
+                vertices.push((point, level));
+            }
+        }
+        let needle = vertices.len();
+
+        let mut elements = Stencils { group_size: NODES, vertices: Vec::new() };
+        let mut element_layer = Vec::new();
+        let mut faces = Stencils { group_size: 0, vertices: Vec::new() };
+        let mut face_points = Vec::new();
+        for cell in &cells {
+            for (at, &layer) in layers.iter().enumerate() {
+                elements.vertices.extend(offsets.iter().map(|&o| index[&lattice(cell, at, o)] as u32));
+                element_layer.push(layer);
+            }
+            let top = top_nodes();
+            let face: Vec<usize> =
+                top.iter().map(|&a| index[&lattice(cell, layers.len() - 1, offsets[a])]).collect();
+            faces.group_size = face.len() + 1;
+            faces.vertices.extend(face.iter().map(|&v| v as u32));
+            faces.vertices.push(needle as u32);
+            face_points.push(face);
+        }
+        let fixed = |vertex: usize, _| vertices[vertex].1 == 0 || disc.is_rim(vertices[vertex].0);
+        let dofs = Dofs::new(needle + 1, 0..needle, fixed, Some(needle));
+        let pattern = Pattern::new(&dofs, &[&elements, &faces]);
+        let symbolic = SymbolicFactor::new(&pattern)?;
+        Ok(WallTopology {
+            division,
+            disc,
+            elements,
+            element_layer,
+            faces,
+            face_points,
+            vertices,
+            dofs,
+            pattern,
+            symbolic,
+        })
+    }
+
+    /// Index of the needle's vertex.
+    pub fn needle(&self) -> usize {
+        self.vertices.len()
+    }
+}
+
+/// One tissue layer as the mesh sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LayerThickness {
+    /// Thickness at rest [mm].
+    pub thickness_mm: f64,
+    /// Whether the layer belongs to the retina and thins with it.
+    pub thins: bool,
+    /// Thickness ratio of each element to the one inside of it (≥ 1 grades towards the contact).
+    pub grading: f64,
+}
+
+/// Rest positions of one contact's mesh.
+#[derive(Clone, Debug)]
+pub struct WallGeometry {
+    /// Position of each disc lattice point in patch parameters [mm].
+    pub parameters: Vec<[f64; 2]>,
+    /// Rest positions of all vertices, x, y, z each, the needle's (zero here) last [mm].
+    pub rest: Vec<f64>,
+    /// Rest geometry of the elements.
+    pub solid: SolidGeometry,
+}
+
+impl WallGeometry {
+    /// Extrudes the disc along the surface's columns.
+    ///
+    /// # Errors
+    /// If an element is inverted at rest (the surface is too rough or the layers too thick for its curvature).
+    pub fn new(
+        topology: &WallTopology,
+        disc: &DiscGeometry,
+        layers: &[LayerThickness],
+        column: impl Fn(f64, f64) -> Column,
+    ) -> Result<Self, WallError> {
+        let parameters = topology.disc.positions(disc);
+        let columns: Vec<Column> = parameters.iter().map(|p| column(p[0], p[1])).collect();
+        let levels = levels(topology, layers);
+        let retina: f64 = layers.iter().filter(|l| l.thins).map(|l| l.thickness_mm).sum();
+        let mut rest = Vec::with_capacity(3 * topology.vertices.len() + 3);
+        for &(point, level) in &topology.vertices {
+            let column = &columns[point];
+            let (thinning_depth, full_depth) = levels[level];
+            let scale = if retina > 0.0 { (retina - column.retina_thinning_mm) / retina } else { 1.0 };
+            let depth = thinning_depth * scale + full_depth;
+            let position = column.surface + column.inward.into_inner() * depth;
+            rest.extend_from_slice(position.coords.as_slice());
+        }
+        rest.extend_from_slice(&[0.0; 3]);
+        let solid = SolidGeometry::new(&topology.elements, &rest)?;
+        Ok(WallGeometry { parameters, rest, solid })
+    }
+}
+
+/// Depth of each lattice level at full thickness: (within layers that thin, within the others) [mm].
+fn levels(topology: &WallTopology, layers: &[LayerThickness]) -> Vec<(f64, f64)> {
+    let mut from_surface = vec![(0.0, 0.0)];
+    let mut depth = (0.0, 0.0);
+    for (layer, &count) in layers.iter().zip(&topology.division.elements_per_layer) {
+        let total: f64 = (0..count).map(|c| layer.grading.powi(c as i32)).sum();
+        for cell in 0..count {
+            let thickness = layer.thickness_mm * layer.grading.powi(cell as i32) / total;
+            for step in 1..=ORDER {
+                let within = thickness * step as f64 / ORDER as f64;
+                from_surface.push(if layer.thins { (depth.0 + within, depth.1) } else { (depth.0, depth.1 + within) });
+            }
+            if layer.thins {
+                depth.0 += thickness;
+            } else {
+                depth.1 += thickness;
+            }
+        }
+    }
+    from_surface.reverse();
+    from_surface
+}

@@ -1,0 +1,232 @@
+//! What goes into a prediction and what comes out of it. All coordinates are the scene's.
+
+use nalgebra::{Point3, Vector3};
+use thiserror::Error;
+
+use crate::mesh::wall::WallError;
+use crate::needle::Needle;
+use crate::patch::PatchError;
+use crate::range::OutOfRange;
+use crate::solve::newton::NewtonError;
+
+/// How accurate, and at what cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Level {
+    /// Layered linear elasticity and an axisymmetric contact law, prepared once per scene: tens of microseconds.
+    Linear,
+    /// Finite elements on a mesh that fits in milliseconds.
+    Coarse,
+    /// Finite elements on the converged mesh: seconds.
+    Reference,
+}
+
+impl Level {
+    /// Every level, cheapest first.
+    pub const ALL: [Level; 3] = [Level::Linear, Level::Coarse, Level::Reference];
+
+    /// The level's name on the wire.
+    pub fn name(self) -> &'static str {
+        match self {
+            Level::Linear => "linear",
+            Level::Coarse => "coarse",
+            Level::Reference => "reference",
+        }
+    }
+}
+
+/// What is given about the needle's motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Control {
+    /// The needle advances along this force until the tissue's reaction along it equals the force [mN].
+    Force(Vector3<f64>),
+    /// The needle stays where it is; the reaction is the answer.
+    Pose,
+}
+
+/// Which effects to simulate.
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
+pub enum EffectChoice {
+    /// Those that the scene calls for.
+    #[default]
+    Auto,
+    /// All that the level knows.
+    All,
+    /// These, by name.
+    Named(Vec<String>),
+}
+
+/// A question to a prepared scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Request {
+    /// The needle before it moves.
+    pub needle: Needle,
+    /// Force or pose control.
+    pub control: Control,
+    /// Which level answers.
+    pub level: Level,
+    /// Which effects are simulated.
+    pub effects: EffectChoice,
+}
+
+/// Whether needle and retina touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ContactState {
+    /// They do not.
+    Clear,
+    /// They do.
+    Touching,
+}
+
+/// Where the needle ends up and what holds it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NeedleOutcome {
+    /// Foremost point [mm].
+    pub tip_mm: Point3<f64>,
+    /// Advance along the force from where it was given [mm]; zero under pose control.
+    pub travel_mm: f64,
+    /// Force of the tissue on the needle [mN].
+    pub reaction_mn: Vector3<f64>,
+}
+
+/// The contact at equilibrium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactReport {
+    /// Whether there is any.
+    pub state: ContactState,
+    /// Contact area, measured on the surface at rest [mm²].
+    pub area_mm2: f64,
+    /// Largest contact pressure [kPa].
+    pub max_pressure_kpa: f64,
+    /// Deepest penetration of the needle into the tissue that the contact law left [mm].
+    pub max_penetration_mm: f64,
+    /// Largest principal stretch minus one, in magnitude, anywhere in the tissue (an estimate at level `linear`).
+    pub max_strain: f64,
+}
+
+/// One effect: simulated or not, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EffectReport {
+    /// Name of the effect.
+    pub name: &'static str,
+    /// Whether it was simulated.
+    pub simulated: bool,
+    /// Why, in words.
+    pub reason: String,
+    /// The number decided on, if there was one.
+    pub value: Option<f64>,
+    /// What it was compared with.
+    pub threshold: Option<f64>,
+}
+
+/// What the solution cost, in units that do not depend on the machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SolverReport {
+    /// Newton iterations over all meshes and load steps.
+    pub iterations: usize,
+    /// Load steps.
+    pub load_steps: usize,
+    /// Unknowns of the last mesh.
+    pub unknowns: usize,
+    /// Residual force at the end [mN].
+    pub residual_mn: f64,
+}
+
+/// The answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prediction {
+    /// Deformed nodes [mm].
+    pub vertices: Vec<Point3<f64>>,
+    /// Unit normals of the deformed surface at the nodes, out of the tissue.
+    pub normals: Vec<Vector3<f64>>,
+    /// Triangles, counter-clockwise seen from the vitreous.
+    pub triangles: Vec<[usize; 3]>,
+    /// Length of each node's displacement [µm].
+    pub displacement_um: Vec<f64>,
+    /// For a patch cut from a mesh: the mesh's index of each node.
+    pub source_indices: Option<Vec<usize>>,
+    /// The needle.
+    pub needle: NeedleOutcome,
+    /// The contact.
+    pub contact: ContactReport,
+    /// Which level answered.
+    pub level: Level,
+    /// Every effect, simulated or not.
+    pub effects: Vec<EffectReport>,
+    /// What it cost.
+    pub solver: SolverReport,
+    /// What the caller should know besides.
+    pub warnings: Vec<String>,
+}
+
+/// Why there is no answer.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum PredictError {
+    /// A number outside its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// The needle or the force points out of the tissue, or along its surface.
+    #[error("{field} leans {angle_deg:.1} degrees from the inward surface normal; at most {max_deg} degrees are allowed")]
+    PointsAway {
+        /// `needle.direction` or `force_mn`.
+        field: &'static str,
+        /// Angle to the inward normal at the contact [degrees].
+        angle_deg: f64,
+        /// Largest allowed angle [degrees].
+        max_deg: f64,
+    },
+    /// The contact would lie outside of the patch.
+    #[error("the needle meets the tissue at ({x_mm:.3}, {y_mm:.3}) mm of the patch frame, outside of the patch (at most {limit_mm} mm from its centre in x and y)")]
+    OutsidePatch {
+        /// Contact point, patch frame [mm].
+        x_mm: f64,
+        /// Contact point, patch frame [mm].
+        y_mm: f64,
+        /// Largest allowed coordinate [mm].
+        limit_mm: f64,
+    },
+    /// The force would drive this needle beyond the depth for which the tissue model holds.
+    #[error("{force_mn} mN on a needle of {radius_mm} mm radius presses the tissue with {pressure_kpa:.1} kPa, beyond the limit of {limit_kpa:.1} kPa for this tissue (puncture)")]
+    BeyondPuncture {
+        /// Force [mN].
+        force_mn: f64,
+        /// Needle radius [mm].
+        radius_mm: f64,
+        /// Force over the needle's cross-section [kPa].
+        pressure_kpa: f64,
+        /// Largest allowed value of it [kPa].
+        limit_kpa: f64,
+    },
+    /// Under pose control: the needle stands deeper in the tissue than the model holds for.
+    #[error("the needle stands {depth_mm:.3} mm deep in the tissue, beyond the limit of {limit_mm:.3} mm")]
+    TooDeep {
+        /// Depth below the rest surface [mm].
+        depth_mm: f64,
+        /// Largest allowed depth [mm].
+        limit_mm: f64,
+    },
+    /// An effect that does not exist, or that the level cannot do without.
+    #[error("effect `{name}`: {problem}")]
+    Effect {
+        /// The name asked for.
+        name: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The patch could not be cut from the scene's mesh.
+    #[error(transparent)]
+    Patch(#[from] PatchError),
+    /// The wall could not be meshed.
+    #[error(transparent)]
+    Mesh(#[from] WallError),
+    /// The equilibrium was not found.
+    #[error("no equilibrium at level `{level}`: {cause}")]
+    Solver {
+        /// The level.
+        level: &'static str,
+        /// The last attempt's failure.
+        cause: NewtonError,
+    },
+    /// The linear level's preparation or contact law failed.
+    #[error("level `linear`: {0}")]
+    Linear(String),
+}

@@ -1,0 +1,5 @@
+//! Linear and nonlinear solution: the sparse Cholesky factorisation (the one place that names faer's sparse code) and Newton's
+//! method on top of it.
+
+pub mod newton;
+pub mod sparse;

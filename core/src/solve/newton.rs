@@ -1,0 +1,336 @@
+//! Newton's method with a line search, for the free unknowns and at most one driven vertex.
+//!
+//! It minimises Π(x, s) = Σ energies − F s over the free positions x and, under force control, the travel s of the driven vertex along a
+//! unit direction d. Each step factorises the Hessian of the free part; the travel is eliminated by the bordering method (two right-hand
+//! sides, one factor). Where the Hessian is not positive definite its diagonal is raised until it is, and only then (projecting
+//! always would cost the quadratic convergence of nearly incompressible elements). The line search accepts no increase of Π and no
+//! position that an effect vetoes. An unconverged state is an error with its residual, never an answer.
+
+use nalgebra::Vector3;
+use thiserror::Error;
+
+use super::sparse::{Factor, LinearSolveError, SymbolicFactor, norm};
+use crate::assemble::{Dofs, Pattern, Predicted, Scratch, energy, gradient, hessian, max_step, predict_stress};
+use crate::effect::Term;
+use crate::progress::Progress;
+
+/// How the driven vertex moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Drive {
+    /// It stays where it is.
+    Held,
+    /// It moves along the unit vector `direction` until the resisting force along it equals `force_mn`.
+    Force {
+        /// Unit direction of travel.
+        direction: Vector3<f64>,
+        /// Force along it [mN].
+        force_mn: f64,
+    },
+}
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NewtonSettings {
+    /// Largest residual force: Euclidean norm over all unknowns [mN].
+    pub tolerance_mn: f64,
+    /// Largest number of iterations.
+    pub max_iterations: usize,
+    /// Largest travel of the driven vertex in one iteration [mm].
+    pub max_travel_mm: f64,
+}
+
+/// What a converged solve cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NewtonReport {
+    /// Newton iterations (each one factorisation).
+    pub iterations: usize,
+    /// Step halvings in the line search.
+    pub halvings: usize,
+    /// Factorisations repeated with a raised diagonal.
+    pub shifts: usize,
+    /// Residual force at the end [mN].
+    pub residual_mn: f64,
+}
+
+/// Why a solve gave no answer.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum NewtonError {
+    /// The iteration limit was reached.
+    #[error("no equilibrium after {iterations} Newton iterations (residual {residual_mn:e} mN, wanted {tolerance_mn:e} mN)")]
+    NotConverged {
+        /// Iterations made.
+        iterations: usize,
+        /// Residual force [mN].
+        residual_mn: f64,
+        /// Wanted residual [mN].
+        tolerance_mn: f64,
+    },
+    /// The line search found no acceptable step.
+    #[error("no step decreases the energy (residual {residual_mn:e} mN after {iterations} iterations)")]
+    LineSearch {
+        /// Iterations made.
+        iterations: usize,
+        /// Residual force [mN].
+        residual_mn: f64,
+    },
+    /// The starting position is vetoed by an effect.
+    #[error("the starting position is not admissible: effect `{effect}` gives no finite energy")]
+    BadStart {
+        /// Name of the effect.
+        effect: &'static str,
+    },
+    /// The linear system was not solved.
+    #[error(transparent)]
+    Linear(#[from] LinearSolveError),
+    /// The caller asked to stop.
+    #[error("interrupted after {iterations} Newton iterations")]
+    Interrupted {
+        /// Iterations made.
+        iterations: usize,
+    },
+}
+
+/// The system to solve.
+pub struct System<'a> {
+    /// Effects, in the order of the pattern's stencils.
+    pub terms: &'a [Term<'a>],
+    /// Numbering of unknowns.
+    pub dofs: &'a Dofs,
+    /// Sparsity.
+    pub pattern: &'a Pattern,
+    /// Analysed factorisation.
+    pub symbolic: &'a SymbolicFactor,
+    /// Index of the driven vertex, if any.
+    pub driven: Option<usize>,
+    /// Constant forces on the free unknowns [mN]; empty for none.
+    pub dead_load: &'a [f64],
+}
+
+/// Memory of the solver, reused between solves of one pattern.
+pub struct Workspace {
+    factor: Factor,
+    values: Vec<f64>,
+    residual: Vec<f64>,
+    scratch: Scratch,
+}
+
+impl Workspace {
+    /// Memory for systems with this pattern.
+    pub fn new(pattern: &Pattern, symbolic: &SymbolicFactor) -> Self {
+        Workspace {
+            factor: Factor::new(symbolic),
+            values: vec![0.0; pattern.len()],
+            residual: vec![0.0; pattern.free + 3],
+            scratch: Scratch::default(),
+        }
+    }
+}
+
+/// Factor by which the diagonal shift grows until the factorisation succeeds.
+const SHIFT_GROWTH: f64 = 10.0;
+/// First diagonal shift, relative to the largest diagonal entry.
+const FIRST_SHIFT: f64 = 1e-4;
+/// Shifts tried before giving up.
+const MAX_SHIFTS: usize = 8;
+/// Halvings tried in one line search.
+const MAX_HALVINGS: usize = 30;
+/// Share of the predicted decrease that a step must achieve (Armijo).
+const SUFFICIENT_DECREASE: f64 = 1e-4;
+/// Relative rounding error of the total energy, below which a decrease cannot be seen.
+const ENERGY_ROUNDOFF: f64 = 1e-13;
+
+impl System<'_> {
+    fn potential(&self, positions: &[f64], start: &[f64], drive: Drive, scratch: &mut Scratch) -> f64 {
+        let mut total = energy(self.terms, positions, scratch);
+        if let (Drive::Force { direction, force_mn }, Some(vertex)) = (drive, self.driven) {
+            let travel: f64 = (0..3).map(|k| (positions[3 * vertex + k] - start[3 * vertex + k]) * direction[k]).sum();
+            total -= force_mn * travel;
+        }
+        if !self.dead_load.is_empty() {
+            for at in 0..positions.len() {
+                if let Some(index) = self.dofs.index(at / 3, at % 3).filter(|&i| i < self.dofs.free) {
+                    total -= self.dead_load[index] * (positions[at] - start[at]);
+                }
+            }
+        }
+        total
+    }
+
+    /// Fills `workspace.residual` with the out-of-balance forces: free unknowns, then the raw force on the driven vertex. Returns the norm
+    /// over what must vanish.
+    fn residual(&self, positions: &[f64], drive: Drive, workspace: &mut Workspace) -> f64 {
+        gradient(self.terms, positions, self.dofs, &mut workspace.scratch, &mut workspace.residual);
+        let free = self.dofs.free;
+        for (r, load) in workspace.residual.iter_mut().zip(self.dead_load) {
+            *r -= load;
+        }
+        let along = match drive {
+            Drive::Held => 0.0,
+            Drive::Force { direction, force_mn } => {
+                Vector3::from_row_slice(&workspace.residual[free..]).dot(&direction) - force_mn
+            }
+        };
+        norm(&workspace.residual[..free]).hypot(along)
+    }
+
+    /// Solves for equilibrium from `positions`, which hold the answer on success.
+    ///
+    /// # Errors
+    /// [`NewtonError`]; `positions` then hold the last accepted iterate.
+    pub fn solve(
+        &self,
+        positions: &mut [f64],
+        drive: Drive,
+        settings: &NewtonSettings,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<NewtonReport, NewtonError> {
+        let free = self.dofs.free;
+        let start = positions.to_vec();
+        let mut report = NewtonReport::default();
+        let mut potential = self.potential(positions, &start, drive, &mut workspace.scratch);
+        if !potential.is_finite() {
+            return Err(self.bad_start(positions, &mut workspace.scratch));
+        }
+        let mut trial = positions.to_vec();
+        let mut moved = vec![0.0; positions.len()];
+        let mixed = true;
+        let mut predicted = if mixed { Predicted::zero(self.terms) } else { Predicted::default() };
+        loop {
+            report.residual_mn = self.residual(positions, drive, workspace);
+            if report.residual_mn <= settings.tolerance_mn {
+                return Ok(report);
+            }
+            if report.iterations >= settings.max_iterations {
+                return Err(NewtonError::NotConverged {
+                    iterations: report.iterations,
+                    residual_mn: report.residual_mn,
+                    tolerance_mn: settings.tolerance_mn,
+                });
+            }
+            if progress.interrupted() {
+                return Err(NewtonError::Interrupted { iterations: report.iterations });
+            }
+            hessian(self.terms, positions, &predicted, self.pattern, &mut workspace.scratch, &mut workspace.values);
+            report.shifts += self.factorize(workspace)?;
+            let (step, slope) = self.step(drive, settings, workspace)?;
+            report.iterations += 1;
+
+            moved.fill(0.0);
+            self.dofs.advance(&mut moved, &step, 1.0);
+            let mut scale = max_step(self.terms, positions, &moved, &mut workspace.scratch);
+            if mixed {
+                moved.iter_mut().for_each(|m| *m *= scale);
+                predict_stress(self.terms, positions, &moved, &mut workspace.scratch, &mut predicted);
+                self.dofs.advance(positions, &step[..free + 3], scale);
+                continue;
+            }
+            let noise = ENERGY_ROUNDOFF * potential.abs().max(f64::MIN_POSITIVE);
+            let mut halvings = 0;
+            let accepted = loop {
+                trial.copy_from_slice(positions);
+                self.dofs.advance(&mut trial, &step[..free + 3], scale);
+                let value = self.potential(&trial, &start, drive, &mut workspace.scratch);
+                if value <= potential + SUFFICIENT_DECREASE * scale * slope + noise {
+                    break Some(value);
+                }
+                halvings += 1;
+                if halvings > MAX_HALVINGS {
+                    break None;
+                }
+                scale *= 0.5;
+            };
+            report.halvings += halvings;
+            let Some(value) = accepted else {
+                return Err(NewtonError::LineSearch { iterations: report.iterations, residual_mn: report.residual_mn });
+            };
+            potential = value;
+            positions.copy_from_slice(&trial);
+        }
+    }
+
+    /// Factorises the free part, raising its diagonal where it must; returns how often.
+    fn factorize(&self, workspace: &mut Workspace) -> Result<usize, NewtonError> {
+        let diagonal: Vec<usize> = (0..self.dofs.free).map(|c| self.pattern.column_starts[c] as usize).collect();
+        let largest = diagonal.iter().map(|&at| workspace.values[at]).fold(0.0, f64::max);
+        let mut shift = 0.0;
+        for attempt in 0..=MAX_SHIFTS {
+            match workspace.factor.factorize(self.symbolic, self.pattern, &workspace.values) {
+                Ok(()) => return Ok(attempt),
+                Err(LinearSolveError::Indefinite) => {
+                    let wanted = if shift == 0.0 { FIRST_SHIFT * largest } else { SHIFT_GROWTH * shift };
+                    for &at in &diagonal {
+                        workspace.values[at] += wanted - shift;
+                    }
+                    shift = wanted;
+                }
+                Err(other) => return Err(other.into()),
+            }
+        }
+        Err(LinearSolveError::Indefinite.into())
+    }
+
+    /// The Newton step (free unknowns, then the border) and the slope of the potential along it.
+    fn step(
+        &self,
+        drive: Drive,
+        settings: &NewtonSettings,
+        workspace: &mut Workspace,
+    ) -> Result<(Vec<f64>, f64), NewtonError> {
+        let free = self.dofs.free;
+        let residual = &workspace.residual;
+        let mut step: Vec<f64> = residual[..free].iter().map(|r| -r).collect();
+        let mut travel = 0.0;
+        let mut out_of_balance = 0.0;
+        match drive {
+            Drive::Held => {
+                workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut step)?;
+            }
+            Drive::Force { direction, force_mn } => {
+                let stored = self.pattern.stored();
+                let border = &workspace.values[stored..];
+                let coupling: Vec<f64> =
+                    (0..free).map(|i| (0..3).map(|k| border[k * free + i] * direction[k]).sum()).collect();
+                let corner = &border[3 * free..];
+                let own: f64 = (0..3)
+                    .flat_map(|i| (0..3).map(move |j| (i, j)))
+                    .map(|(i, j)| direction[i] * direction[j] * corner[3 * i.max(j) + i.min(j)])
+                    .sum();
+                out_of_balance = Vector3::from_row_slice(&residual[free..]).dot(&direction) - force_mn;
+                let mut columns = step;
+                columns.extend_from_slice(&coupling);
+                workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut columns)?;
+                let (alone, response) = columns.split_at(free);
+                let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+                let stiffness = own - dot(&coupling, response);
+                let drive = -out_of_balance - dot(&coupling, alone);
+                // Without stiffness (no contact yet, or past a limit point) only the sign of the drive is known.
+                travel = if stiffness > 0.0 { drive / stiffness } else { drive.signum() * settings.max_travel_mm };
+                travel = travel.clamp(-settings.max_travel_mm, settings.max_travel_mm);
+                step = alone.iter().zip(response).map(|(a, r)| a - travel * r).collect();
+            }
+        }
+        let slope =
+            step.iter().zip(&workspace.residual[..free]).map(|(s, r)| s * r).sum::<f64>() + travel * out_of_balance;
+        match drive {
+            Drive::Held => step.extend_from_slice(&[0.0; 3]),
+            Drive::Force { direction, .. } => step.extend((direction * travel).iter()),
+        }
+        Ok((step, slope.min(0.0)))
+    }
+
+    fn bad_start(&self, positions: &[f64], scratch: &mut Scratch) -> NewtonError {
+        let effect = self
+            .terms
+            .iter()
+            .find(|term| !energy(std::slice::from_ref(*term), positions, scratch).is_finite())
+            .map_or("unknown", |term| term.effect.name());
+        NewtonError::BadStart { effect }
+    }
+}
+
+/// The force that holds the driven vertex, from the residual of the last evaluation [mN].
+pub fn holding_force(workspace: &Workspace) -> Vector3<f64> {
+    let free = workspace.residual.len() - 3;
+    Vector3::from_row_slice(&workspace.residual[free..])
+}
