@@ -18,7 +18,7 @@ use crate::tissue::Tissue;
 /// Thickness of the retina around the built-in fovea, mm: its thickest by the source of [`PIT_DEPTH`], so the floor is 0.10 mm.
 pub const FOVEA_RETINA_MM: f64 = 0.23;
 
-/// The retina that a pit must leave, mm; [unverified] bound of this program, half of the foveola's 0.10 mm.
+/// The retina that a pit must leave, mm; (unverified) bound of this program, half of the foveola's 0.10 mm.
 pub const LEAST_PIT_FLOOR_MM: f64 = 0.05;
 
 const BUILT_IN: [&str; 3] = ["flat", "macula", "fovea"];

@@ -127,7 +127,7 @@ impl Tissue {
 
     /// The default wall with the retina as five sublayers of equal thickness and [`RABBIT_SUBLAYER_MODULI_KPA`].
     ///
-    /// The source gives moduli and not thicknesses, so equal thickness is a choice [unverified].
+    /// The source gives moduli and not thicknesses, so equal thickness is a choice (unverified).
     pub fn rabbit_sublayers() -> Self {
         let whole = ranges::RETINA.default_layer();
         let thickness_mm = whole.thickness_mm / RABBIT_SUBLAYER_MODULI_KPA.len() as f64;

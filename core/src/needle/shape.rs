@@ -40,7 +40,7 @@ pub const BEVEL_ANGLE: ParameterRange = ParameterRange {
     source: "[unverified] range of ground needles; beyond 75 deg use a flat tip",
 };
 
-/// Edge radius where a scene gives none, as a fraction of the needle's radius [unverified].
+/// Edge radius where a scene gives none, as a fraction of the needle's radius (unverified).
 pub const EDGE_FRACTION_OF_RADIUS: f64 = 0.1;
 
 /// How the needle ends.

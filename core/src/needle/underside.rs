@@ -4,8 +4,8 @@
 //! around an axis, because a contact law that knows one radius needs one height. Exact to 1e-6 mm. Units: mm.
 //!
 //! The body is convex, so along a ray from that plane the distance falls to its first zero as a convex function: Newton's method
-//! from below never passes the zero, and a distance that stops falling is a miss. Along one azimuth the height is convex too, so the
-//! chord through the last two heights, extended, is a start from below for the next.
+//! from before the zero never passes it, from just inside it steps back before it, and a distance that stops falling is a miss. From
+//! one radius to the next a parabola through the last heights gives the start, so two steps are the rule. A ball needs none.
 //!
 //! Not here: the contact law.
 
@@ -19,10 +19,10 @@ const AZIMUTHS: usize = 16;
 /// Share of the azimuths that must meet the needle for a height to be finite.
 const LEAST_HITS: f64 = 0.5;
 
-/// A ray has arrived when its next step is below this, mm; a thousandth of the accuracy promised.
-const STEP_TOLERANCE_MM: f64 = 1e-9;
+/// A ray has arrived when its step is below this, mm: a tenth of the accuracy promised, for rays that graze and only halve the way.
+const STEP_TOLERANCE_MM: f64 = 1e-7;
 
-/// Newton steps after which a grazing ray counts as a miss; each at least halves what is left of the way.
+/// Newton steps after which a grazing ray counts as a miss.
 const STEP_LIMIT: usize = 60;
 
 /// Two directions closer than this are the same one, two lengths closer than this (mm) too.
@@ -31,27 +31,29 @@ const ALIGNED: f64 = 1e-12;
 /// The way from one radius to the next along an azimuth.
 #[derive(Clone, Copy, Default)]
 struct Walk {
-    /// Radius and height of the last two hits, mm; the newest last.
-    hits: [Option<(f64, f64)>; 2],
+    /// Radius and height of the last three hits, mm; the newest last.
+    hits: [(f64, f64); 3],
+    hit_count: usize,
     missed: bool,
 }
 
 impl Walk {
-    /// A height that is not above the needle at `radius`, mm.
-    fn start(&self, radius: f64) -> f64 {
-        match self.hits {
-            [Some((r0, h0)), Some((r1, h1))] if r1 > r0 => {
-                let ahead = h1 + (h1 - h0) / (r1 - r0) * (radius - r1);
-                // Rounding of two near heights must not lift the start above the needle.
-                (ahead - STEP_TOLERANCE_MM * (radius - r0) / (r1 - r0)).max(0.0)
-            }
-            _ => 0.0,
+    /// The height expected at `radius`, mm: on the parabola through the last three hits.
+    fn guess(&self, radius: f64) -> f64 {
+        let [(r0, h0), (r1, h1), (r2, h2)] = self.hits;
+        if self.hit_count < 3 || r0 == r1 || r1 == r2 {
+            return h2;
         }
+        let (first, second) = ((h1 - h0) / (r1 - r0), (h2 - h1) / (r2 - r1));
+        h2 + (radius - r2) * (second + (radius - r1) * (second - first) / (r2 - r0))
     }
 
     fn record(&mut self, radius: f64, height: Option<f64>) {
         match height {
-            Some(height) => self.hits = [self.hits[1], Some((radius, height))],
+            Some(height) => {
+                self.hits = [self.hits[1], self.hits[2], (radius, height)];
+                self.hit_count += 1;
+            }
             None => self.missed = true,
         }
     }
@@ -90,7 +92,7 @@ impl Body {
                     continue;
                 }
                 let height =
-                    self.height_on_ray(&(base + direction * radius), &up, walk.start(radius));
+                    self.height_on_ray(&(base + direction * radius), &up, walk.guess(radius));
                 walk.record(radius, height);
                 if let Some(height) = height {
                     sum += weight * height;
@@ -136,21 +138,34 @@ impl Body {
             .collect()
     }
 
-    /// Height at which the ray from `origin` along `up` meets the needle, mm; `start` is not above it. `None` when it misses.
-    fn height_on_ray(&self, origin: &Point3<f64>, up: &Vector3<f64>, start: f64) -> Option<f64> {
+    /// Height at which the ray from `origin` along `up` first meets the needle, mm; `None` when it misses.
+    fn height_on_ray(&self, origin: &Point3<f64>, up: &Vector3<f64>, guess: f64) -> Option<f64> {
+        if self.core_radius == 0.0 && self.plane_normal.0 == 0.0 {
+            let from_centre = origin - Point3::new(0.0, 0.0, self.edge_radius);
+            let towards = -from_centre.dot(up);
+            let half_chord_squared = towards * towards
+                - (from_centre.norm_squared() - self.edge_radius * self.edge_radius);
+            let height = towards - half_chord_squared.max(0.0).sqrt();
+            if half_chord_squared >= 0.0 && from_centre.z + height * up.z <= 0.0 {
+                return Some(height);
+            }
+        }
+        // A guess may lie beyond the needle, where the distance no longer falls; the touching plane never does.
+        self.advance(origin, up, guess)
+            .or_else(|| self.advance(origin, up, 0.0))
+    }
+
+    /// Newton's method from a start on the ray; `None` where the distance does not fall along the ray.
+    fn advance(&self, origin: &Point3<f64>, up: &Vector3<f64>, start: f64) -> Option<f64> {
         let mut height = start;
         for _ in 0..STEP_LIMIT {
             let (distance, slope) = self.distance_along(&(origin + up * height), up);
-            // At or, by rounding, just inside the needle: the start from below was the answer.
-            if distance <= 0.0 {
-                return Some(height);
-            }
             if slope >= 0.0 {
                 return None;
             }
-            let step = distance / -slope;
+            let step = -distance / slope;
             height += step;
-            if step < STEP_TOLERANCE_MM {
+            if step.abs() < STEP_TOLERANCE_MM {
                 return Some(height);
             }
         }
