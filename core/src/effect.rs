@@ -33,7 +33,7 @@ pub trait Effect: Send + Sync {
     /// Energy [µJ]; infinite where the position must not be accepted (an inverted element).
     fn energy(&self, local: &Local) -> f64;
 
-    /// Adds ∂energy/∂position [mN] to `out`.
+    /// Adds ∂energy/∂position [mN] to `out`; not a number where the energy is infinite.
     fn add_gradient(&self, local: &Local, out: &mut [f64]);
 
     /// Adds ∂²energy/∂position² [mN/mm] to the lower triangle of `out`.

@@ -3,9 +3,11 @@
 //! Units everywhere: mm, mN, kPa (= mN/mm²), s, kg, µJ (= mN·mm). Patch frame: right-handed, origin on the inner retinal
 //! surface, +z out of the tissue into the vitreous. This crate does no I/O, reads no clock and spawns no thread.
 
+pub mod approach;
 pub mod assemble;
 pub mod effect;
 pub mod effects;
+pub mod equilibrium;
 pub mod mesh;
 pub mod needle;
 pub mod patch;

@@ -62,8 +62,8 @@ impl ContactFaces {
         ContactFaces { values, areas, points: slopes.len() }
     }
 
-    /// Shape function values of one quadrature point.
-    fn values(&self, point: usize) -> &[f64] {
+    /// Values of the face's shape functions at one quadrature point.
+    pub fn values(&self, point: usize) -> &[f64] {
         &self.values[point * FACE_NODES..(point + 1) * FACE_NODES]
     }
 

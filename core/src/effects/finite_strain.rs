@@ -130,7 +130,10 @@ impl FiniteStrain<'_> {
 
     #[inline(always)]
     fn add_gradient_n(&self, local: &Local, out: &mut [f64]) {
-        let Some(points) = self.points(local) else { return };
+        let Some(points) = self.points(local) else {
+            out.fill(f64::NAN);
+            return;
+        };
         let pressure = self.pressure(local, &points);
         let mu = self.materials[local.group].mu;
         let mut stress = [Matrix3::zeros(); POINTS];

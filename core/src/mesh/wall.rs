@@ -154,8 +154,6 @@ pub struct LayerThickness {
     pub thickness_mm: f64,
     /// Whether the layer belongs to the retina and thins with it.
     pub thins: bool,
-    /// Thickness ratio of each element to the one inside of it (≥ 1 grades towards the contact).
-    pub grading: f64,
 }
 
 /// Rest positions of one contact's mesh.
@@ -204,9 +202,8 @@ fn levels(topology: &WallTopology, layers: &[LayerThickness]) -> Vec<(f64, f64)>
     let mut from_surface = vec![(0.0, 0.0)];
     let mut depth = (0.0, 0.0);
     for (layer, &count) in layers.iter().zip(&topology.division.elements_per_layer) {
-        let total: f64 = (0..count).map(|c| layer.grading.powi(c as i32)).sum();
-        for cell in 0..count {
-            let thickness = layer.thickness_mm * layer.grading.powi(cell as i32) / total;
+        for _ in 0..count {
+            let thickness = layer.thickness_mm / count as f64;
             for step in 1..=ORDER {
                 let within = thickness * step as f64 / ORDER as f64;
                 from_surface.push(if layer.thins { (depth.0 + within, depth.1) } else { (depth.0, depth.1 + within) });

@@ -106,6 +106,11 @@ impl Body {
         }
     }
 
+    /// Radius of the shaft [mm].
+    pub fn radius_mm(&self) -> f64 {
+        self.core_radius + self.edge_radius
+    }
+
     /// Signed distance to the needle's surface at a needle-local point, mm, negative inside.
     pub fn distance(&self, local: &Point3<f64>) -> f64 {
         let Coordinates {

@@ -1,0 +1,393 @@
+//! The equilibrium of one contact on one mesh: needle, wall and force in; positions, travel and reaction out.
+//!
+//! Patch frame throughout. [`Wall`] is the meshed problem; [`Wall::solve`] finds its equilibrium from a start, directly if it can, by load
+//! steps if it must. Not here: how fine a mesh a level uses, where the mesh is centred.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
+
+use crate::effect::{Effect, Local, Term};
+use crate::effects::contact::{Contact, ContactFaces};
+use crate::effects::elasticity::Elasticity;
+use crate::effects::finite_strain::{FiniteStrain, Lame, NeoHookean};
+use crate::mesh::disc::DiscGeometry;
+use crate::mesh::element::{NODES, POINTS};
+use crate::mesh::wall::{LayerThickness, WallError, WallGeometry, WallTopology};
+use crate::needle::Body;
+use crate::progress::Progress;
+use crate::solve::newton::{
+    Drive, Globalization, NewtonError, NewtonReport, NewtonSettings, System, Workspace, holding_force,
+};
+use crate::surface::Surface;
+use crate::tissue::{LayerKind, Tissue};
+
+/// Which solid energy is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Solid {
+    /// Small strain.
+    Elasticity,
+    /// Neo-Hookean.
+    FiniteStrain,
+}
+
+/// Numerical parameters of the contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactSettings {
+    /// Penalty stiffness [kPa/mm].
+    pub stiffness_kpa_per_mm: f64,
+    /// Smoothing distance [mm].
+    pub smoothing_mm: f64,
+    /// Gauss points along each edge of a face.
+    pub points_per_edge: usize,
+}
+
+/// The needle as the wall sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Tool<'a> {
+    /// Its solid.
+    pub body: &'a Body,
+    /// Its pose before it moves.
+    pub patch_from_needle: Isometry3<f64>,
+}
+
+/// How the needle is driven.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Direction of advance.
+    pub direction: Unit<Vector3<f64>>,
+    /// Force along it [mN]; `None`: the needle is advanced by `travel_mm` and held.
+    pub force_mn: Option<f64>,
+    /// Travel from the given pose: the target under pose control, a guess under force control [mm].
+    pub travel_mm: f64,
+}
+
+/// A meshed wall under a needle.
+pub struct Wall<'a> {
+    topology: &'a WallTopology,
+    /// Rest geometry.
+    pub geometry: WallGeometry,
+    materials: Vec<Lame>,
+    faces: ContactFaces,
+    solid: Solid,
+    contact: ContactSettings,
+    tool: Tool<'a>,
+}
+
+/// One way to reach an equilibrium.
+struct Attempt {
+    load_steps: usize,
+    globalization: Globalization,
+    /// Newton iterations for each load step.
+    max_iterations: usize,
+}
+
+/// An equilibrium.
+#[derive(Clone, Debug)]
+pub struct Equilibrium {
+    /// Current positions of all vertices, the needle's tip last [mm].
+    pub positions: Vec<f64>,
+    /// Travel of the needle from its given pose [mm].
+    pub travel_mm: f64,
+    /// Force of the tissue on the needle [mN].
+    pub reaction_mn: Vector3<f64>,
+    /// Cost of all load steps together.
+    pub newton: NewtonReport,
+    /// Load steps.
+    pub load_steps: usize,
+}
+
+/// The contact of an equilibrium.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactSummary {
+    /// Rest area under pressure [mm²].
+    pub area_mm2: f64,
+    /// Largest pressure [kPa].
+    pub max_pressure_kpa: f64,
+    /// Deepest penetration [mm].
+    pub max_penetration_mm: f64,
+    /// Centre of pressure in patch parameters.
+    pub center: [f64; 2],
+}
+
+/// Residual relative to the force scale at which Newton stops.
+const RELATIVE_TOLERANCE: f64 = 1e-8;
+/// Force scale under pose control [mN]: that of a light touch.
+const POSE_FORCE_SCALE_MN: f64 = 0.01;
+/// Smallest force scale [mN]: below it rounding of the tissue's stresses decides.
+const SMALLEST_FORCE_MN: f64 = 1e-7;
+/// What is tried, in this order: directly from the given start, then from first touch in load steps.
+const ATTEMPTS: [Attempt; 3] = [
+    Attempt { load_steps: 1, globalization: Globalization::PredictedStress, max_iterations: 25 },
+    Attempt { load_steps: 6, globalization: Globalization::PredictedStress, max_iterations: 20 },
+    Attempt { load_steps: 12, globalization: Globalization::LineSearch, max_iterations: 100 },
+];
+/// Share of the remaining way by which the needle overlaps the tissue at the start of load steps.
+const FIRST_OVERLAP: f64 = 0.05;
+/// Largest travel in one Newton iteration, in needle radii.
+const MAX_TRAVEL_PER_RADIUS: f64 = 0.5;
+/// Iterations that bring the needle to first contact.
+const TOUCH_ITERATIONS: usize = 20;
+
+impl<'a> Wall<'a> {
+    /// Meshes the wall under `surface` over the disc.
+    ///
+    /// # Errors
+    /// If the wall cannot be meshed there.
+    pub fn new(
+        topology: &'a WallTopology,
+        surface: &Surface,
+        tissue: &Tissue,
+        disc: &DiscGeometry,
+        solid: Solid,
+        contact: ContactSettings,
+        tool: Tool<'a>,
+    ) -> Result<Self, WallError> {
+        let layers = tissue.layers();
+        let thicknesses: Vec<LayerThickness> = layers
+            .iter()
+            .map(|named| LayerThickness {
+                thickness_mm: named.layer.thickness_mm,
+                thins: matches!(named.kind, LayerKind::Retina(_)),
+            })
+            .collect();
+        let geometry = WallGeometry::new(topology, disc, &thicknesses, |x, y| surface.column(x, y))?;
+        let lame = |layer: usize| Lame {
+            mu: layers[layer].layer.shear_modulus_kpa(),
+            lambda: layers[layer].layer.first_lame_kpa(),
+        };
+        let materials = topology.element_layer.iter().map(|&layer| lame(layer)).collect();
+        let faces = ContactFaces::new(&topology.faces, &geometry.rest, contact.points_per_edge);
+        Ok(Wall { topology, geometry, materials, faces, solid, contact, tool })
+    }
+
+    /// The mesh's topology.
+    pub fn topology(&self) -> &WallTopology {
+        self.topology
+    }
+
+    /// Rest positions with the needle's tip at its given pose.
+    pub fn start(&self) -> Vec<f64> {
+        let mut positions = self.geometry.rest.clone();
+        self.place_tip(&mut positions, &Vector3::zeros());
+        positions
+    }
+
+    /// Puts the needle's tip at `offset` from its given pose.
+    pub fn place_tip(&self, positions: &mut [f64], offset: &Vector3<f64>) {
+        let tip = self.tool.patch_from_needle.translation.vector + offset;
+        positions[3 * self.topology.needle()..].copy_from_slice(tip.as_slice());
+    }
+
+    fn contact(&self) -> Contact<'_> {
+        Contact {
+            faces: &self.faces,
+            shape: self.tool.body,
+            frame_from_needle: self.tool.patch_from_needle.rotation.to_rotation_matrix(),
+            stiffness_kpa_per_mm: self.contact.stiffness_kpa_per_mm,
+            smoothing_mm: self.contact.smoothing_mm,
+        }
+    }
+
+    fn solid(&self) -> Box<dyn Effect + '_> {
+        let (geometry, materials) = (&self.geometry.solid, &self.materials[..]);
+        match self.solid {
+            Solid::Elasticity => Box::new(Elasticity { geometry, materials }),
+            Solid::FiniteStrain => Box::new(FiniteStrain { geometry, materials, law: NeoHookean::Logarithmic }),
+        }
+    }
+
+    /// The travel along `direction` at which the needle first touches the rest surface, from the guess `travel_mm`; `None` if
+    /// the line misses the mesh.
+    pub fn touch(&self, direction: &Unit<Vector3<f64>>, mut travel_mm: f64) -> Option<f64> {
+        let contact = self.contact();
+        let mut positions = self.start();
+        let stencils = &self.topology.faces;
+        let mut local = vec![0.0; 3 * stencils.group_size];
+        for _ in 0..TOUCH_ITERATIONS {
+            self.place_tip(&mut positions, &(direction.into_inner() * travel_mm));
+            let mut nearest = (f64::INFINITY, Point3::origin());
+            for group in 0..stencils.len() {
+                stencils.gather(group, &positions, &mut local);
+                let local = Local { current: &local, group, predicted: &[] };
+                for point in contact.contact_points(&local) {
+                    if point.gap_mm < nearest.0 {
+                        nearest = (point.gap_mm, point.position);
+                    }
+                }
+            }
+            let mut pose = self.tool.patch_from_needle;
+            pose.translation.vector += direction.into_inner() * travel_mm;
+            let gradient = self.tool.body.signed_distance(&pose.inverse_transform_point(&nearest.1)).gradient;
+            let closing = (pose.rotation * gradient).dot(direction);
+            if closing < 1e-3 {
+                return None;
+            }
+            let step = nearest.0 / closing;
+            travel_mm += step;
+            if step.abs() < 0.1 * self.contact.smoothing_mm {
+                return Some(travel_mm);
+            }
+        }
+        None
+    }
+
+    /// Finds the equilibrium of `motion` from the start `positions` (tissue and tip); load steps, if they are needed, begin at
+    /// first touch `touch_mm` with the tissue at rest.
+    ///
+    /// # Errors
+    /// The failure of the last attempt.
+    pub fn solve(
+        &self,
+        motion: &Motion,
+        touch_mm: f64,
+        positions: Vec<f64>,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Equilibrium, NewtonError> {
+        let mut start = Some(positions);
+        let mut failed_iterations = 0;
+        let mut failure = NewtonError::Interrupted { iterations: 0 };
+        for attempt in &ATTEMPTS {
+            let positions = start.take().unwrap_or_else(|| self.touching(motion, touch_mm));
+            match self.follow(motion, touch_mm, attempt, positions, workspace, progress) {
+                Ok(mut equilibrium) => {
+                    equilibrium.newton.iterations += failed_iterations;
+                    return Ok(equilibrium);
+                }
+                Err(stop @ NewtonError::Interrupted { .. }) => return Err(stop),
+                Err(error) => {
+                    failed_iterations += error.iterations();
+                    failure = error;
+                }
+            }
+        }
+        Err(failure)
+    }
+
+    /// The tissue at rest and the needle just overlapping it.
+    fn touching(&self, motion: &Motion, touch_mm: f64) -> Vec<f64> {
+        let mut positions = self.start();
+        let overlap = FIRST_OVERLAP * (motion.travel_mm - touch_mm).max(0.0) + 2.0 * self.contact.smoothing_mm;
+        self.place_tip(&mut positions, &(motion.direction.into_inner() * (touch_mm + overlap)));
+        positions
+    }
+
+    /// Follows equal load steps to the whole motion.
+    fn follow(
+        &self,
+        motion: &Motion,
+        touch_mm: f64,
+        attempt: &Attempt,
+        mut positions: Vec<f64>,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Equilibrium, NewtonError> {
+        let solid = self.solid();
+        let contact = self.contact();
+        let terms = [
+            Term { effect: solid.as_ref(), stencils: &self.topology.elements },
+            Term { effect: &contact, stencils: &self.topology.faces },
+        ];
+        let system = System {
+            terms: &terms,
+            dofs: &self.topology.dofs,
+            pattern: &self.topology.pattern,
+            symbolic: &self.topology.symbolic,
+            driven: Some(self.topology.needle()),
+            dead_load: &[],
+        };
+        let direction = motion.direction.into_inner();
+        let scale = motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN).max(SMALLEST_FORCE_MN);
+        let settings = NewtonSettings {
+            globalization: attempt.globalization,
+            tolerance_mn: RELATIVE_TOLERANCE * scale,
+            max_iterations: attempt.max_iterations,
+            max_travel_mm: MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
+        };
+        let mut total = NewtonReport::default();
+        for step in 1..=attempt.load_steps {
+            let share = step as f64 / attempt.load_steps as f64;
+            let drive = match motion.force_mn {
+                Some(force_mn) => Drive::Force { direction, force_mn: share * force_mn },
+                None => {
+                    let travel_mm = touch_mm + share * (motion.travel_mm - touch_mm);
+                    self.place_tip(&mut positions, &(direction * travel_mm));
+                    Drive::Held
+                }
+            };
+            let report = system.solve(&mut positions, drive, &settings, workspace, progress)?;
+            total = NewtonReport {
+                iterations: total.iterations + report.iterations,
+                halvings: total.halvings + report.halvings,
+                shifts: total.shifts + report.shifts,
+                residual_mn: report.residual_mn,
+            };
+        }
+        Ok(self.equilibrium(motion, positions, total, attempt.load_steps, workspace))
+    }
+
+    fn equilibrium(
+        &self,
+        motion: &Motion,
+        positions: Vec<f64>,
+        newton: NewtonReport,
+        load_steps: usize,
+        workspace: &Workspace,
+    ) -> Equilibrium {
+        let tip = Vector3::from_row_slice(&positions[3 * self.topology.needle()..]);
+        let travel_mm = (tip - self.tool.patch_from_needle.translation.vector).dot(&motion.direction);
+        Equilibrium { positions, travel_mm, reaction_mn: -holding_force(workspace), newton, load_steps }
+    }
+
+    /// Area, pressure and penetration of the contact.
+    pub fn contact_summary(&self, positions: &[f64]) -> ContactSummary {
+        let contact = self.contact();
+        let stencils = &self.topology.faces;
+        let mut local = vec![0.0; 3 * stencils.group_size];
+        let mut summary = ContactSummary::default();
+        let (mut force, mut moment) = (0.0, [0.0; 2]);
+        for (group, face) in self.topology.face_points.iter().enumerate() {
+            stencils.gather(group, positions, &mut local);
+            let local = Local { current: &local, group, predicted: &[] };
+            if !contact.is_active(&local) {
+                continue;
+            }
+            for (index, point) in contact.contact_points(&local).enumerate() {
+                summary.max_penetration_mm = summary.max_penetration_mm.max(-point.gap_mm);
+                if point.pressure_kpa <= 0.0 {
+                    continue;
+                }
+                summary.area_mm2 += point.area_mm2;
+                summary.max_pressure_kpa = summary.max_pressure_kpa.max(point.pressure_kpa);
+                let share = point.pressure_kpa * point.area_mm2;
+                force += share;
+                for (&vertex, value) in face.iter().zip(self.faces.values(index)) {
+                    let parameter = self.geometry.parameters[self.topology.vertices[vertex].0];
+                    moment = [0, 1].map(|k| moment[k] + share * value * parameter[k]);
+                }
+            }
+        }
+        if force > 0.0 {
+            summary.center = moment.map(|m| m / force);
+        }
+        summary
+    }
+
+    /// Largest |principal stretch − 1| at the quadrature points.
+    pub fn max_strain(&self, positions: &[f64]) -> f64 {
+        let stencils = &self.topology.elements;
+        let mut local = [0.0; 3 * NODES];
+        let mut largest: f64 = 0.0;
+        for element in 0..stencils.len() {
+            stencils.gather(element, positions, &mut local);
+            for point in 0..POINTS {
+                let f = self.geometry.solid.deformation_gradient(element, point, &local);
+                // |σ − 1| ≤ ‖F − 1‖ for every principal stretch σ: only candidates are worth an eigenvalue problem.
+                if (f - Matrix3::identity()).norm() > largest {
+                    let stretches = (f.transpose() * f).symmetric_eigenvalues().map(|l| (l.max(0.0).sqrt() - 1.0).abs());
+                    largest = largest.max(stretches.max());
+                }
+            }
+        }
+        largest
+    }
+}
