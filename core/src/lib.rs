@@ -2,3 +2,5 @@
 //!
 //! Units everywhere: mm, mN, kPa (= mN/mm²), s, kg, µJ (= mN·mm). Patch frame: right-handed, origin on the inner retinal
 //! surface, +z out of the tissue into the vitreous. This crate does no I/O, reads no clock and spawns no thread.
+
+pub mod layered;
