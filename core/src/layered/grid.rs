@@ -91,7 +91,7 @@ impl RadialGrid {
         self.nodes_mm[self.nodes_mm.len() - 1]
     }
 
-    /// Index i of the interval samples[i] ≤ r ≤ samples[i + 1] that holds `r_mm`, which must lie within the grid.
+    /// Index i of the interval `samples[i] ≤ r ≤ samples[i + 1]` that holds `r_mm`, which must lie within the grid.
     pub fn sample_interval(&self, r_mm: f64) -> usize {
         let samples = &self.samples_mm;
         if r_mm < samples[1] {
@@ -109,7 +109,7 @@ impl RadialGrid {
         }
     }
 
-    /// Index i of the interval nodes[i] ≤ r ≤ nodes[i + 1] that holds `r_mm`, which must lie within the grid.
+    /// Index i of the interval `nodes[i] ≤ r ≤ nodes[i + 1]` that holds `r_mm`, which must lie within the grid.
     pub fn node_interval(&self, r_mm: f64) -> usize {
         let mut index = Self::sample_node(self.sample_interval(r_mm));
         while index + 2 < self.nodes_mm.len() && r_mm >= self.nodes_mm[index + 1] {
