@@ -16,6 +16,9 @@ use crate::mesh::element::{MODES, NODES, POINTS, QUADRATURE};
 /// One number per node for each component: a row of shape function gradients.
 pub type NodeRows = [[f64; NODES]; 3];
 
+/// Component pairs (row, column) of the lower block triangle of an element matrix.
+const BLOCKS: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+
 /// A mesh that cannot carry a solid.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SolidGeometryError {
@@ -161,31 +164,25 @@ impl SolidGeometry {
     ) {
         let rows = out.as_chunks_mut::<NODES>().0;
         for a in 0..NODES {
+            // One pass over the points for all blocks of this row, so that gradients are loaded once.
             let mut isotropic = [0.0; NODES];
+            let mut blocks = [[0.0; NODES]; BLOCKS.len()];
             for q in 0..POINTS {
-                let rest = self.gradients(element, q);
-                for row in rest {
-                    let scale = coefficients[q].rest * row[a];
-                    for b in 0..NODES {
-                        isotropic[b] = row[b].mul_add(scale, isotropic[b]);
+                let (rest, g, c) = (self.gradients(element, q), &spatial[q], &coefficients[q]);
+                let scale = [0, 1, 2].map(|k| c.rest * rest[k][a]);
+                let cross = [0, 1, 2].map(|k| c.cross * g[k][a]);
+                let outer = [0, 1, 2].map(|k| c.outer * g[k][a]);
+                for b in 0..NODES {
+                    isotropic[b] += scale[0] * rest[0][b] + scale[1] * rest[1][b] + scale[2] * rest[2][b];
+                    for (block, &(i, j)) in blocks.iter_mut().zip(&BLOCKS) {
+                        block[b] = g[i][b].mul_add(cross[j], g[j][b].mul_add(outer[i], block[b]));
                     }
                 }
             }
-            for i in 0..3 {
-                for j in 0..=i {
-                    let mut sum = if i == j { isotropic } else { [0.0; NODES] };
-                    for q in 0..POINTS {
-                        let (gi, gj) = (&spatial[q][i], &spatial[q][j]);
-                        let cross = coefficients[q].cross * gj[a];
-                        let outer = coefficients[q].outer * gi[a];
-                        for b in 0..NODES {
-                            sum[b] = gi[b].mul_add(cross, gj[b].mul_add(outer, sum[b]));
-                        }
-                    }
-                    let row = &mut rows[(i * NODES + a) * 3 + j];
-                    for b in 0..NODES {
-                        row[b] += sum[b];
-                    }
+            for (block, &(i, j)) in blocks.iter().zip(&BLOCKS) {
+                let row = &mut rows[(i * NODES + a) * 3 + j];
+                for b in 0..NODES {
+                    row[b] += block[b] + if i == j { isotropic[b] } else { 0.0 };
                 }
             }
         }
@@ -217,17 +214,25 @@ impl SolidGeometry {
             }
         }
         let core = self.mode_inverse[element] * core * self.mode_inverse[element];
-        let rows = out.as_chunks_mut::<NODES>().0;
-        for i in 0..3 {
-            for a in 0..NODES {
-                for m in 0..MODES {
-                    let scale: f64 = (0..MODES).map(|l| core[(m, l)] * integrals[l][i][a]).sum();
-                    for j in 0..=i {
-                        let row = &mut rows[(i * NODES + a) * 3 + j];
-                        for b in 0..NODES {
-                            row[b] = integrals[m][j][b].mul_add(scale, row[b]);
-                        }
+        let mut scaled = [[[0.0; NODES]; 3]; MODES];
+        for m in 0..MODES {
+            for l in 0..MODES {
+                for k in 0..3 {
+                    for a in 0..NODES {
+                        scaled[m][k][a] += core[(m, l)] * integrals[l][k][a];
                     }
+                }
+            }
+        }
+        let rows = out.as_chunks_mut::<NODES>().0;
+        for &(i, j) in &BLOCKS {
+            for a in 0..NODES {
+                let scale = [0, 1, 2, 3].map(|m| scaled[m][i][a]);
+                let row = &mut rows[(i * NODES + a) * 3 + j];
+                for b in 0..NODES {
+                    let first = integrals[0][j][b].mul_add(scale[0], row[b]);
+                    let second = integrals[1][j][b].mul_add(scale[1], integrals[2][j][b] * scale[2]);
+                    row[b] = integrals[3][j][b].mul_add(scale[3], first) + second;
                 }
             }
         }
