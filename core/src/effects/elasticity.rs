@@ -93,7 +93,7 @@ impl ElementKernel for Gradient<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) -> () {
+    fn run(self) {
         self.0.add_gradient_n(self.1, self.2)
     }
 }
@@ -104,7 +104,7 @@ impl ElementKernel for Hessian<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) -> () {
+    fn run(self) {
         self.0.add_hessian_n(self.1, self.2)
     }
 }
