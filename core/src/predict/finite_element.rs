@@ -106,6 +106,18 @@ pub struct FiniteElementAnswer {
     pub estimate: ContactEstimate,
 }
 
+/// A level's mesh and memory for one prediction.
+pub struct Bench<'a> {
+    /// The level's name, for errors.
+    pub level: &'static str,
+    /// How finely it computes.
+    pub resolution: &'a Resolution,
+    /// The mesh's topology, made for `resolution`.
+    pub topology: &'a WallTopology,
+    /// The solver's memory.
+    pub workspace: &'a mut Workspace,
+}
+
 /// The problem of one prediction, patch frame.
 pub struct Problem<'a> {
     /// The patch.
@@ -132,22 +144,20 @@ impl Problem<'_> {
         DiscGeometry { center: estimate.center, radii }
     }
 
-    /// Solves on a mesh of `topology` around the estimated contact, from the displacements `start` (patch parameters and depth in layers
+    /// Solves on a mesh around the estimated contact, from the displacements `start` (patch parameters and depth in layers
     /// in, displacement out).
     ///
     /// # Errors
     /// [`PredictError::Mesh`], [`PredictError::Solver`].
     pub fn solve(
         &self,
-        level: &'static str,
-        resolution: &Resolution,
-        topology: &WallTopology,
+        bench: &mut Bench,
         estimate: &ContactEstimate,
         start: &dyn Fn([f64; 2], f64) -> Vector3<f64>,
-        workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
         progress.stage("mesh");
+        let Bench { level, resolution, topology, workspace } = bench;
         let disc = self.disc(resolution, estimate);
         let wall =
             Wall::new(topology, &self.patch.surface, self.tissue, &disc, self.solid, resolution.contact, self.tool)?;
@@ -167,7 +177,7 @@ impl Problem<'_> {
         progress.stage("equilibrium");
         let equilibrium = wall
             .solve(&motion, touch_mm, positions, workspace, progress)
-            .map_err(|cause| PredictError::Solver { level, cause })?;
+            .map_err(|cause| PredictError::Solver { level: *level, cause })?;
         progress.stage("surface");
         Ok(self.answer(&wall, &equilibrium, touch_mm))
     }
