@@ -1,0 +1,162 @@
+//! The program: serve, or answer one request from a file.
+//!
+//! Contract of `predict`: the response goes to standard output and is that of `POST /v1/predict`; a problem goes to standard error as the
+//! same document that HTTP has, and the program ends with 1. The command line is at fault: 2.
+
+use std::fs;
+use std::io::{self, IsTerminal as _, Read as _, Write as _};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use clap::Parser as _;
+use retina_core::predict::{PreparedScene, Workspace};
+use retina_core::progress::Progress as _;
+use retina_core::scene::{Scene, SceneSurface};
+use retina_core::surface::mesh_file::{MeshFormat, read_mesh};
+use tokio_util::sync::CancellationToken;
+use tracing_subscriber::EnvFilter;
+
+use crate::answer::predict;
+use crate::config::{Command, CommandLine, Config, LogForm, PredictArgs};
+use crate::problem::{Kind, Problem, from_predict};
+use crate::read::read;
+use crate::stopwatch::Stopwatch;
+use crate::understand;
+use crate::wire::PredictRequest;
+use crate::write::Layout;
+use crate::{App, run};
+
+/// Runs the program as its command line says.
+pub fn main() -> ExitCode {
+    let CommandLine { command, config } = CommandLine::parse();
+    match command {
+        Some(Command::Predict(args)) => predict_file(&args),
+        Some(Command::Serve(config)) => serve(&config),
+        None => serve(&config),
+    }
+}
+
+fn serve(config: &Config) -> ExitCode {
+    start_log(config.log);
+    match serve_until_ctrl_c(config) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            tracing::error!(%error, listen = %config.listen, "the service ended");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[tokio::main]
+async fn serve_until_ctrl_c(config: &Config) -> io::Result<()> {
+    let listener = tokio::net::TcpListener::bind(config.listen).await?;
+    let address = listener.local_addr()?;
+    tracing::info!("listening on http://{address}, try http://{address}/docs");
+    let shutdown = CancellationToken::new();
+    let stop = shutdown.clone();
+    tokio::spawn(async move {
+        // Without a way to hear of ctrl-c the service runs on, as it must.
+        if tokio::signal::ctrl_c().await.is_ok() {
+            tracing::info!("stopping after what was accepted");
+            stop.cancel();
+        }
+    });
+    run(listener, App::start(config)?, shutdown).await
+}
+
+fn start_log(form: LogForm) {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+    let log = tracing_subscriber::fmt()
+        .with_writer(io::stderr)
+        .with_env_filter(filter);
+    match form {
+        LogForm::Pretty => log.with_ansi(io::stderr().is_terminal()).init(),
+        LogForm::Json => log.json().init(),
+    }
+}
+
+fn predict_file(args: &PredictArgs) -> ExitCode {
+    let body = match read_input(&args.request) {
+        Ok(body) => body,
+        Err(error) => {
+            eprintln!("{}: {error}", args.request.display());
+            return ExitCode::from(2);
+        }
+    };
+    let layout = if args.pretty {
+        Layout::Indented
+    } else {
+        Layout::Compact
+    };
+    match answer(&body, args.mesh.as_deref(), layout) {
+        Ok(mut answer) => {
+            answer.push(b'\n');
+            match io::stdout().write_all(&answer) {
+                Ok(()) => ExitCode::SUCCESS,
+                Err(_) => ExitCode::FAILURE,
+            }
+        }
+        Err(problem) => {
+            let document = serde_json::to_string_pretty(&problem.document()).unwrap_or_default();
+            eprintln!("{document}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn read_input(path: &Path) -> io::Result<Vec<u8>> {
+    if path == Path::new("-") {
+        let mut bytes = Vec::new();
+        io::stdin().read_to_end(&mut bytes)?;
+        return Ok(bytes);
+    }
+    fs::read(path)
+}
+
+fn answer(body: &[u8], mesh: Option<&Path>, layout: Layout) -> Result<Vec<u8>, Problem> {
+    let mut stopwatch = Stopwatch::start(Instant::now(), Duration::MAX / 4, &|| false);
+    let message: PredictRequest = read(body)?;
+    let request = understand::request(&message)?;
+    let mut scene = understand::chosen(message.scene.as_ref())?;
+    if let Some(path) = mesh {
+        replace_surface(&mut scene, path)?;
+    }
+    stopwatch.stage("prepare");
+    let scene = PreparedScene::new(scene).map_err(from_predict)?;
+    predict(
+        &scene,
+        &request,
+        &mut Workspace::default(),
+        &mut stopwatch,
+        layout,
+    )
+}
+
+fn replace_surface(scene: &mut Scene, path: &Path) -> Result<(), Problem> {
+    let refuse = |allowed: &str, reason: String| {
+        let detail = format!("{}: {reason}", path.display());
+        Problem::field(Kind::InvalidMesh, "--mesh", None, allowed, detail)
+    };
+    let format = match path.extension().and_then(|extension| extension.to_str()) {
+        Some("ply") => MeshFormat::Ply,
+        Some("obj") => MeshFormat::Obj,
+        _ => {
+            return Err(refuse(
+                "a file named .ply or .obj",
+                "unknown format".to_owned(),
+            ));
+        }
+    };
+    let bytes =
+        fs::read(path).map_err(|error| refuse("a file that can be read", error.to_string()))?;
+    let mesh = read_mesh(&bytes, format).map_err(|error| {
+        refuse(
+            "a triangle mesh in mm with a common outward side",
+            error.to_string(),
+        )
+    })?;
+    scene.surface = SceneSurface::Mesh(Arc::new(mesh));
+    Ok(())
+}
