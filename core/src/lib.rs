@@ -8,6 +8,7 @@ pub mod assemble;
 pub mod effect;
 pub mod effects;
 pub mod equilibrium;
+pub mod layered;
 pub mod mesh;
 pub mod needle;
 pub mod patch;

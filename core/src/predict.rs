@@ -2,6 +2,7 @@
 //!
 //! [`PreparedScene`] holds what depends on the scene alone; [`Workspace`] is a thread's memory. Not here: HTTP, clocks, threads.
 
+pub mod finite_element;
 pub mod types;
 
 pub use types::*;

@@ -267,6 +267,7 @@ impl System<'_> {
             let (halvings, residual_mn) = taken.ok_or(stuck)?;
             report.halvings += halvings;
             report.residual_mn = residual_mn;
+            if std::env::var("DBG").is_ok() { let f=self.dofs.free; eprintln!("  it {} res {:.3e} halv {} shifts {} travel {:.5} |step| {:.3e}", report.iterations, residual_mn, report.halvings, report.shifts, (step[f]*step[f]+step[f+1]*step[f+1]+step[f+2]*step[f+2]).sqrt(), step.iter().fold(0.0f64,|a,b|a.max(b.abs()))); }
         }
         Ok(report)
     }

@@ -1,0 +1,213 @@
+//! The finite-element levels: where the mesh stands, how fine it is, and the solve on it.
+
+use nalgebra::{Point3, Vector3};
+
+use super::types::{ContactReport, ContactState, PredictError, SolverReport};
+use crate::equilibrium::{ContactSettings, ContactSummary, Equilibrium, Motion, Solid, Tool, Wall};
+use crate::mesh::disc::DiscGeometry;
+use crate::mesh::sample::locate;
+use crate::mesh::wall::{WallDivision, WallTopology};
+use crate::patch::Patch;
+use crate::progress::Progress;
+use crate::solve::newton::Workspace;
+use crate::tissue::{LayerKind, Tissue};
+
+/// How finely a level computes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resolution {
+    /// Cells along each edge of the mesh's core.
+    pub core_cells: usize,
+    /// Rings around it.
+    pub rings: usize,
+    /// Elements through the retina (shared among its sublayers, at least one each).
+    pub retina_elements: usize,
+    /// Elements through the choroid.
+    pub choroid_elements: usize,
+    /// Elements through the sclera; 0 leaves it out as rigid.
+    pub sclera_elements: usize,
+    /// Radius of the mesh's core in estimated contact radii.
+    pub core_per_contact: f64,
+    /// Distance from the contact's edge to the fixed rim [mm].
+    pub rim_mm: f64,
+    /// The contact's numerical parameters.
+    pub contact: ContactSettings,
+}
+
+/// Level `coarse`.
+pub const COARSE: Resolution = Resolution {
+    core_cells: 1,
+    rings: 4,
+    retina_elements: 1,
+    choroid_elements: 1,
+    sclera_elements: 0,
+    core_per_contact: 0.8,
+    rim_mm: 1.5,
+    contact: ContactSettings { stiffness_kpa_per_mm: 5e4, smoothing_mm: 5e-4, points_per_edge: 3 },
+};
+
+/// Level `reference`.
+pub const REFERENCE: Resolution = Resolution {
+    core_cells: 4,
+    rings: 8,
+    retina_elements: 3,
+    choroid_elements: 2,
+    sclera_elements: 1,
+    core_per_contact: 1.0,
+    rim_mm: 2.0,
+    contact: ContactSettings { stiffness_kpa_per_mm: 3e5, smoothing_mm: 2e-4, points_per_edge: 3 },
+};
+
+impl Resolution {
+    /// The mesh division for `tissue`.
+    pub fn division(&self, tissue: &Tissue) -> WallDivision {
+        let sublayers = tissue.retina.len();
+        let elements_per_layer = tissue
+            .layers()
+            .iter()
+            .map(|named| match named.kind {
+                LayerKind::InnerLimitingMembrane => 1,
+                LayerKind::Retina(_) => self.retina_elements.div_ceil(sublayers),
+                LayerKind::Choroid => self.choroid_elements,
+                LayerKind::Sclera => self.sclera_elements,
+            })
+            .collect();
+        WallDivision { core_cells: self.core_cells, rings: self.rings, elements_per_layer }
+    }
+}
+
+/// What is known of the contact before it is computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactEstimate {
+    /// Patch parameters of its centre at equilibrium.
+    pub center: [f64; 2],
+    /// Its radius [mm].
+    pub radius_mm: f64,
+    /// Travel of the needle at first touch [mm].
+    pub touch_mm: f64,
+    /// Travel of the needle at equilibrium [mm].
+    pub travel_mm: f64,
+}
+
+/// Smallest contact radius that a mesh is made for, in needle radii.
+const SMALLEST_CONTACT: f64 = 0.05;
+/// Share of the estimated way beyond first touch at which the solve starts.
+const START_SHARE: f64 = 0.5;
+
+/// The answer of a finite-element level, patch frame.
+pub struct FiniteElementAnswer {
+    /// Displacement of each node of the patch [mm].
+    pub displacements: Vec<Vector3<f64>>,
+    /// Travel of the needle [mm].
+    pub travel_mm: f64,
+    /// Force of the tissue on the needle [mN].
+    pub reaction_mn: Vector3<f64>,
+    /// The contact.
+    pub contact: ContactReport,
+    /// What it cost.
+    pub solver: SolverReport,
+    /// The contact as computed, to aim a finer mesh.
+    pub estimate: ContactEstimate,
+}
+
+/// The problem of one prediction, patch frame.
+pub struct Problem<'a> {
+    /// The patch.
+    pub patch: &'a Patch,
+    /// The tissue.
+    pub tissue: &'a Tissue,
+    /// The needle.
+    pub tool: Tool<'a>,
+    /// How it is driven.
+    pub motion: Motion,
+    /// Which solid energy.
+    pub solid: Solid,
+}
+
+impl Problem<'_> {
+    /// The disc of a mesh around the estimated contact.
+    fn disc(&self, resolution: &Resolution, estimate: &ContactEstimate) -> DiscGeometry {
+        let needle_radius = self.tool.body.radius_mm();
+        let contact = estimate.radius_mm.max(SMALLEST_CONTACT * needle_radius);
+        let core = resolution.core_per_contact * contact;
+        let rim = contact + resolution.rim_mm;
+        let ratio = (rim / core).powf(1.0 / resolution.rings as f64);
+        let radii = (0..=resolution.rings).map(|ring| core * ratio.powi(ring as i32)).collect();
+        DiscGeometry { center: estimate.center, radii }
+    }
+
+    /// Solves on a mesh of `topology` around the estimated contact.
+    ///
+    /// # Errors
+    /// [`PredictError::Mesh`], [`PredictError::Solver`].
+    pub fn solve(
+        &self,
+        level: &'static str,
+        resolution: &Resolution,
+        topology: &WallTopology,
+        estimate: &ContactEstimate,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<FiniteElementAnswer, PredictError> {
+        progress.stage("mesh");
+        let disc = self.disc(resolution, estimate);
+        let wall =
+            Wall::new(topology, &self.patch.surface, self.tissue, &disc, self.solid, resolution.contact, self.tool)?;
+        let touch_mm = wall.touch(&self.motion.direction, estimate.touch_mm).unwrap_or(estimate.touch_mm);
+        let beyond = estimate.travel_mm - estimate.touch_mm;
+        let motion = match self.motion.force_mn {
+            Some(_) => Motion { travel_mm: touch_mm + START_SHARE * beyond, ..self.motion },
+            None => self.motion,
+        };
+        let mut positions = wall.start();
+        wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm));
+        progress.stage("equilibrium");
+        let equilibrium = wall
+            .solve(&motion, touch_mm, positions, workspace, progress)
+            .map_err(|cause| PredictError::Solver { level, cause })?;
+        progress.stage("surface");
+        Ok(self.answer(&wall, &equilibrium, touch_mm))
+    }
+
+    fn answer(&self, wall: &Wall, equilibrium: &Equilibrium, touch_mm: f64) -> FiniteElementAnswer {
+        let displacement: Vec<f64> =
+            equilibrium.positions.iter().zip(&wall.geometry.rest).map(|(current, rest)| current - rest).collect();
+        let node = |&parameter: &[f64; 2]| match locate(wall.topology(), &wall.geometry, parameter) {
+            Some(sample) => sample.interpolate(&displacement),
+            None => Vector3::zeros(),
+        };
+        let summary = wall.contact_summary(&equilibrium.positions);
+        FiniteElementAnswer {
+            displacements: self.patch.parameters.iter().map(node).collect(),
+            travel_mm: equilibrium.travel_mm,
+            reaction_mn: equilibrium.reaction_mn,
+            contact: report(&summary, wall.max_strain(&equilibrium.positions)),
+            solver: SolverReport {
+                iterations: equilibrium.newton.iterations,
+                load_steps: equilibrium.load_steps,
+                unknowns: wall.topology().dofs.free,
+                residual_mn: equilibrium.newton.residual_mn,
+            },
+            estimate: ContactEstimate {
+                center: summary.center,
+                radius_mm: (summary.area_mm2 / std::f64::consts::PI).sqrt(),
+                touch_mm,
+                travel_mm: equilibrium.travel_mm,
+            },
+        }
+    }
+}
+
+fn report(summary: &ContactSummary, max_strain: f64) -> ContactReport {
+    ContactReport {
+        state: if summary.area_mm2 > 0.0 { ContactState::Touching } else { ContactState::Clear },
+        area_mm2: summary.area_mm2,
+        max_pressure_kpa: summary.max_pressure_kpa,
+        max_penetration_mm: summary.max_penetration_mm.max(0.0),
+        max_strain,
+    }
+}
+
+/// The tip's position at the end of a motion, patch frame.
+pub fn final_tip(tool: &Tool, motion: &Motion, travel_mm: f64) -> Point3<f64> {
+    Point3::from(tool.patch_from_needle.translation.vector + motion.direction.into_inner() * travel_mm)
+}

@@ -1,0 +1,3 @@
+//! Closed forms and published or independently computed values.
+
+mod linear_layer;
