@@ -4,7 +4,7 @@
 //! same document that HTTP has, and the program ends with 1. The command line is at fault: 2.
 
 use std::fs;
-use std::io::{self, IsTerminal as _, Read as _, Write as _};
+use std::io::{self, IsTerminal as _, Read, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -28,11 +28,31 @@ use crate::wire::PredictRequest;
 use crate::write::Layout;
 use crate::{App, run};
 
+/// Where the program reads from and writes to.
+pub struct Streams<'a> {
+    /// Standard input.
+    pub input: &'a mut dyn Read,
+    /// Standard output.
+    pub output: &'a mut dyn Write,
+    /// Standard error.
+    pub problems: &'a mut dyn Write,
+}
+
 /// Runs the program as its command line says.
 pub fn main() -> ExitCode {
     let CommandLine { command, config } = CommandLine::parse();
     match command {
-        Some(Command::Predict(args)) => predict_file(&args),
+        Some(Command::Predict(args)) => {
+            let streams = Streams {
+                input: &mut io::stdin(),
+                output: &mut io::stdout(),
+                problems: &mut io::stderr(),
+            };
+            match predict_file(&args, streams) {
+                Ok(code) => ExitCode::from(code),
+                Err(_) => ExitCode::FAILURE,
+            }
+        }
         Some(Command::Serve(config)) => serve(&config),
         None => serve(&config),
     }
@@ -77,39 +97,40 @@ fn start_log(form: LogForm) {
     }
 }
 
-fn predict_file(args: &PredictArgs) -> ExitCode {
-    let body = match read_input(&args.request) {
+/// `retina-server predict`; returns the exit code.
+///
+/// # Errors
+/// If a stream cannot be written.
+pub fn predict_file(args: &PredictArgs, streams: Streams) -> io::Result<u8> {
+    let body = match read_input(&args.request, streams.input) {
         Ok(body) => body,
         Err(error) => {
-            eprintln!("{}: {error}", args.request.display());
-            return ExitCode::from(2);
+            writeln!(streams.problems, "{}: {error}", args.request.display())?;
+            return Ok(2);
         }
     };
-    let layout = if args.pretty {
-        Layout::Indented
-    } else {
-        Layout::Compact
+    let layout = match args.pretty {
+        true => Layout::Indented,
+        false => Layout::Compact,
     };
     match answer(&body, args.mesh.as_deref(), layout) {
-        Ok(mut answer) => {
-            answer.push(b'\n');
-            match io::stdout().write_all(&answer) {
-                Ok(()) => ExitCode::SUCCESS,
-                Err(_) => ExitCode::FAILURE,
-            }
+        Ok(answer) => {
+            streams.output.write_all(&answer)?;
+            streams.output.write_all(b"\n")?;
+            Ok(0)
         }
         Err(problem) => {
-            let document = serde_json::to_string_pretty(&problem.document()).unwrap_or_default();
-            eprintln!("{document}");
-            ExitCode::FAILURE
+            serde_json::to_writer_pretty(&mut *streams.problems, &problem.document())?;
+            writeln!(streams.problems)?;
+            Ok(1)
         }
     }
 }
 
-fn read_input(path: &Path) -> io::Result<Vec<u8>> {
+fn read_input(path: &Path, input: &mut dyn Read) -> io::Result<Vec<u8>> {
     if path == Path::new("-") {
         let mut bytes = Vec::new();
-        io::stdin().read_to_end(&mut bytes)?;
+        input.read_to_end(&mut bytes)?;
         return Ok(bytes);
     }
     fs::read(path)
