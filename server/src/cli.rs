@@ -69,7 +69,8 @@ fn serve(config: &Config) -> ExitCode {
     }
 }
 
-#[tokio::main]
+/// One thread talks: the numerical threads do the work, and handing it to one of several talking threads costs a wake-up more.
+#[tokio::main(flavor = "current_thread")]
 async fn serve_until_ctrl_c(config: &Config) -> io::Result<()> {
     let listener = tokio::net::TcpListener::bind(config.listen).await?;
     let address = listener.local_addr()?;

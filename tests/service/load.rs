@@ -66,7 +66,7 @@ fn a_scene_is_prepared_once_for_all_who_ask() {
             .iter()
             .all(|scene| std::sync::Arc::ptr_eq(scene, &prepared[0]))
     );
-    let other = scenes.get(Some(&sphere(11.5))).ok().expect("scene");
+    let other = scenes.get(Some(&sphere(11.5))).expect("scene");
     assert!(
         !std::sync::Arc::ptr_eq(&other, &prepared[0]),
         "another radius is another scene"
@@ -81,7 +81,7 @@ fn scenes_that_nobody_uses_make_room_and_used_ones_stay() {
         scenes.inline_bytes()
     };
     let scenes = Scenes::new(2 * one + one / 2);
-    let used = scenes.get(Some(&sphere(9.0))).ok().expect("scene");
+    let used = scenes.get(Some(&sphere(9.0))).expect("scene");
     for step in 0..8 {
         drop(scenes.get(Some(&sphere(10.0 + 0.1 * f64::from(step)))));
         assert!(
@@ -90,7 +90,7 @@ fn scenes_that_nobody_uses_make_room_and_used_ones_stay() {
             scenes.inline_bytes()
         );
     }
-    let again = scenes.get(Some(&sphere(9.0))).ok().expect("scene");
+    let again = scenes.get(Some(&sphere(9.0))).expect("scene");
     assert!(
         std::sync::Arc::ptr_eq(&used, &again),
         "a scene in use was forgotten"
