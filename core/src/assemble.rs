@@ -178,6 +178,13 @@ impl Predicted {
         Predicted { terms: terms.iter().map(|t| vec![0.0; t.effect.predicted_len() * t.stencils.len()]).collect() }
     }
 
+    /// Forgets every stress.
+    pub fn clear(&mut self) {
+        for stresses in &mut self.terms {
+            stresses.fill(0.0);
+        }
+    }
+
     fn of(&self, term: usize, group: usize, len: usize) -> &[f64] {
         self.terms.get(term).map_or(&[], |stresses| &stresses[group * len..(group + 1) * len])
     }
@@ -185,9 +192,7 @@ impl Predicted {
 
 /// Fills `out` with the stresses at the end of the linear step `step` (layout of positions) from `positions`.
 pub fn predict_stress(terms: &[Term], positions: &[f64], step: &[f64], scratch: &mut Scratch, out: &mut Predicted) {
-    for stresses in &mut out.terms {
-        stresses.fill(0.0);
-    }
+    out.clear();
     for_each_active(terms, positions, &Predicted::default(), scratch, |index, term, local, moved, _| {
         let len = term.effect.predicted_len();
         moved.resize(3 * term.stencils.group_size, 0.0);

@@ -123,7 +123,7 @@ const ATTEMPTS: [Attempt; 3] = [
 /// Share of the remaining way by which the needle overlaps the tissue at the start of load steps.
 const FIRST_OVERLAP: f64 = 0.05;
 /// Largest travel in one Newton iteration, in needle radii.
-const MAX_TRAVEL_PER_RADIUS: f64 = 0.5;
+const MAX_TRAVEL_PER_RADIUS: f64 = 0.25;
 /// Iterations that bring the needle to first contact.
 const TOUCH_ITERATIONS: usize = 20;
 
@@ -168,6 +168,22 @@ impl<'a> Wall<'a> {
     pub fn start(&self) -> Vec<f64> {
         let mut positions = self.geometry.rest.clone();
         self.place_tip(&mut positions, &Vector3::zeros());
+        positions
+    }
+
+    /// Positions displaced by `field` (patch parameters and depth in layers in, displacement out), the needle's tip at its given
+    /// pose. Fixed vertices stay.
+    pub fn displaced(&self, field: &dyn Fn([f64; 2], f64) -> Vector3<f64>) -> Vec<f64> {
+        let mut positions = self.start();
+        for (vertex, &(point, _)) in self.topology.vertices.iter().enumerate() {
+            if self.topology.dofs.index(vertex, 0).is_none() {
+                continue;
+            }
+            let moved = field(self.geometry.parameters[point], self.geometry.layer_coordinates[vertex]);
+            for k in 0..3 {
+                positions[3 * vertex + k] += moved[k];
+            }
+        }
         positions
     }
 
@@ -299,6 +315,7 @@ impl<'a> Wall<'a> {
         let scale = motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN).max(SMALLEST_FORCE_MN);
         let settings = NewtonSettings {
             globalization: attempt.globalization,
+            force_scale_mn: scale,
             tolerance_mn: RELATIVE_TOLERANCE * scale,
             max_iterations: attempt.max_iterations,
             max_travel_mm: MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),

@@ -1,32 +1,69 @@
 //! One call from a question to an answer: scene, needle, force and level in; surface, normals and report out.
 //!
-//! [`PreparedScene`] holds what depends on the scene alone; [`Workspace`] is a thread's memory. Not here: HTTP, clocks, threads.
+//! [`PreparedScene`] holds what depends on the scene alone; [`Workspace`] is a thread's memory. Read on in `types` (what goes in and comes
+//! out), `linear` (the layered answer, start of all others), `finite_element` (the levels on meshes), `choice` (effects). Not here: HTTP, clocks,
+//! threads.
 
+pub mod beds;
+pub mod choice;
 pub mod finite_element;
+pub mod linear;
+mod topologies;
 pub mod types;
 
 pub use types::*;
 
+use std::sync::Arc;
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use crate::equilibrium::{Motion, Tool};
+use crate::mesh::wall::WallTopology;
+use crate::needle::Body;
+use crate::patch::{Patch, vertex_normals};
 use crate::progress::Progress;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneSurface};
+use crate::solve::newton;
+use beds::Beds;
+use choice::{Decision, Expected, decide};
+use finite_element::{COARSE, ContactEstimate, FiniteElementAnswer, Problem, REFERENCE};
+use linear::{LinearAnswer, Load, press};
+use topologies::shared_topology;
+
+/// Force over the needle's cross-section, in Young's moduli of the innermost retina, beyond which tissue models of this kind do not
+/// hold: the needle punctures. Chosen where the finite-element levels still converge throughout; no puncture force of the retina is
+/// published.
+pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = 0.75;
+
+/// Depth under pose control beyond which no answer is given, as a share of retina and choroid together.
+pub const MAX_DEPTH_SHARE: f64 = 0.7;
 
 /// A scene with everything that depends on it alone. Shared between threads.
 pub struct PreparedScene {
     scene: Scene,
+    beds: Beds,
+    /// The patch, where it does not depend on the contact.
+    patch: Option<Patch>,
 }
 
 /// A thread's memory, reused between predictions.
 #[derive(Default)]
-pub struct Workspace {}
+pub struct Workspace {
+    coarse: Option<(Arc<WallTopology>, newton::Workspace)>,
+}
 
 impl PreparedScene {
     /// Validates and prepares `scene`.
     ///
     /// # Errors
-    /// [`PredictError::OutOfRange`] naming the field; [`PredictError::Linear`].
+    /// [`PredictError::OutOfRange`] naming the field.
     pub fn new(scene: Scene) -> Result<Self, PredictError> {
         scene.validate()?;
-        Ok(PreparedScene { scene })
+        let patch = match scene.surface {
+            SceneSurface::Mesh(_) => None,
+            _ => Some(scene.patch(&Point3::origin())?),
+        };
+        Ok(PreparedScene { beds: Beds::new(&scene), scene, patch })
     }
 
     /// The scene.
@@ -36,7 +73,13 @@ impl PreparedScene {
 
     /// Memory that the preparation holds [bytes].
     pub fn memory_bytes(&self) -> usize {
-        size_of::<Self>()
+        let mesh = match &self.scene.surface {
+            SceneSurface::Mesh(mesh) => {
+                size_of_val(mesh.vertices()) + size_of_val(mesh.triangles())
+            }
+            _ => 0,
+        };
+        size_of::<Self>() + self.beds.memory_bytes() + mesh
     }
 
     /// Answers `request`.
@@ -46,9 +89,308 @@ impl PreparedScene {
     pub fn predict(
         &self,
         request: &Request,
-        _workspace: &mut Workspace,
-        _progress: &mut dyn Progress,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
     ) -> Result<Prediction, PredictError> {
-        Err(PredictError::Linear(format!("{:?} is not there yet", request.level)))
+        progress.stage("linear");
+        request.needle.validate()?;
+        let body = request.needle.shape.body();
+        let first = self.question(request, &body, &request.needle.tip_mm)?;
+        let question = match self.scene.surface {
+            // The patch is the nodes nearest to the contact: cut again where the needle touches.
+            SceneSurface::Mesh(_) => match press(first.patch(), &first.tool, &first.motion) {
+                Ok(press) => {
+                    let [x, y] = press.touch.parameter;
+                    let touch = first.patch().surface.column(x, y).surface;
+                    let touch_in_scene = first.patch().scene_from_patch * touch;
+                    self.question(request, &body, &touch_in_scene)?
+                }
+                Err(_) => first,
+            },
+            _ => first,
+        };
+        question.answer(workspace, progress)
+    }
+
+    /// The request in the frame of the patch around `contact`.
+    fn question<'a>(
+        &'a self,
+        request: &'a Request,
+        body: &'a Body,
+        contact: &Point3<f64>,
+    ) -> Result<Question<'a>, PredictError> {
+        let patch = match &self.patch {
+            Some(patch) => CutOrGrid::Grid(patch),
+            None => CutOrGrid::Cut(Box::new(self.scene.patch(contact)?)),
+        };
+        let frame = match &patch {
+            CutOrGrid::Grid(patch) => patch.scene_from_patch,
+            CutOrGrid::Cut(patch) => patch.scene_from_patch,
+        };
+        let patch_from_needle = frame.inverse() * request.needle.scene_from_needle();
+        let motion = match request.control {
+            Control::Force(force) => Motion {
+                direction: Unit::try_new(frame.inverse() * force, 0.0).unwrap_or(-Vector3::z_axis()),
+                force_mn: Some(force.norm()),
+                travel_mm: 0.0,
+            },
+            Control::Pose => Motion {
+                direction: patch_from_needle.rotation * -Vector3::z_axis(),
+                force_mn: None,
+                travel_mm: 0.0,
+            },
+        };
+        Ok(Question { prepared: self, request, patch, tool: Tool { body, patch_from_needle }, motion })
+    }
+}
+
+/// A grid's patch is the scene's, a cut one the request's own.
+enum CutOrGrid<'a> {
+    Grid(&'a Patch),
+    Cut(Box<Patch>),
+}
+
+/// A request in the patch frame.
+struct Question<'a> {
+    prepared: &'a PreparedScene,
+    request: &'a Request,
+    patch: CutOrGrid<'a>,
+    tool: Tool<'a>,
+    motion: Motion,
+}
+
+impl Question<'_> {
+    fn patch(&self) -> &Patch {
+        match &self.patch {
+            CutOrGrid::Grid(patch) => patch,
+            CutOrGrid::Cut(patch) => patch,
+        }
+    }
+
+    fn answer(&self, workspace: &mut Workspace, progress: &mut dyn Progress) -> Result<Prediction, PredictError> {
+        let still = Expected { depth_mm: 0.0, strain: 0.0 };
+        if self.motion.force_mn == Some(0.0) {
+            let decision = decide(&self.request.effects, self.request.level, still)?;
+            return Ok(self.at_rest(decision, "no force is applied"));
+        }
+        let press = press(self.patch(), &self.tool, &self.motion)?;
+        self.check_range(&press.load)?;
+        let closed = !matches!(press.load, Load::Depth(depth) if depth <= 0.0);
+        if !closed {
+            let decision = decide(&self.request.effects, self.request.level, still)?;
+            return Ok(self.at_rest(decision, "the needle does not reach the surface"));
+        }
+        let linear = LinearAnswer::new(
+            &self.prepared.beds,
+            self.patch(),
+            &self.tool,
+            self.request.needle.shape.tip,
+            press,
+            &self.motion.direction,
+        )?;
+        let strain = linear.depth_mm / self.yielding_mm();
+        let decision =
+            decide(&self.request.effects, self.request.level, Expected { depth_mm: linear.depth_mm, strain })?;
+        if !decision.contact {
+            return Ok(self.at_rest(decision, "contact is not simulated"));
+        }
+        let answer = match self.request.level {
+            Level::Linear => self.linear(&linear, strain),
+            Level::Coarse => self.coarse(&linear, &decision, workspace, progress)?,
+            Level::Reference => self.reference(&linear, &decision, workspace, progress)?,
+        };
+        Ok(self.prediction(answer, decision))
+    }
+
+    /// Thickness of retina and choroid [mm].
+    fn yielding_mm(&self) -> f64 {
+        let tissue = &self.prepared.scene.tissue;
+        tissue.retina_thickness_mm() + tissue.choroid.thickness_mm
+    }
+
+    fn check_range(&self, load: &Load) -> Result<(), PredictError> {
+        if let Some(force_mn) = self.motion.force_mn {
+            let radius_mm = self.tool.body.radius_mm();
+            let pressure_kpa = force_mn / (std::f64::consts::PI * radius_mm * radius_mm);
+            let softest = |low: f64, layer: &crate::tissue::Layer| low.min(layer.youngs_modulus_kpa);
+            let modulus = self.prepared.scene.tissue.retina.iter().fold(f64::INFINITY, softest);
+            let limit_kpa = PUNCTURE_PRESSURE_PER_MODULUS * modulus;
+            if pressure_kpa > limit_kpa {
+                return Err(PredictError::BeyondPuncture { force_mn, radius_mm, pressure_kpa, limit_kpa });
+            }
+        }
+        let limit_mm = MAX_DEPTH_SHARE * self.yielding_mm();
+        match *load {
+            Load::Depth(depth_mm) if depth_mm > limit_mm => Err(PredictError::TooDeep { depth_mm, limit_mm }),
+            _ => Ok(()),
+        }
+    }
+
+    fn linear(&self, linear: &LinearAnswer, strain: f64) -> FiniteElementAnswer {
+        let radius_mm = linear.contact_radius_mm;
+        let travel_mm = if self.motion.force_mn.is_some() { linear.travel_mm() } else { 0.0 };
+        let displacements: Vec<Vector3<f64>> =
+            self.patch().parameters.iter().map(|&parameter| linear.displacement(parameter)).collect();
+        let mut pose = self.tool.patch_from_needle;
+        pose.translation.vector += self.motion.direction.into_inner() * travel_mm;
+        let penetration = |(vertex, moved): (&Point3<f64>, &Vector3<f64>)| {
+            -self.tool.body.distance(&pose.inverse_transform_point(&(vertex + moved)))
+        };
+        let max_penetration_mm = self.patch().vertices.iter().zip(&displacements).map(penetration).fold(0.0, f64::max);
+        FiniteElementAnswer {
+            displacements,
+            travel_mm,
+            reaction_mn: linear.press.touch.inward.into_inner() * -linear.normal_force_mn,
+            contact: ContactReport {
+                state: ContactState::Touching,
+                area_mm2: std::f64::consts::PI * radius_mm * radius_mm,
+                max_pressure_kpa: linear.max_pressure_kpa,
+                max_penetration_mm,
+                max_strain: strain,
+            },
+            solver: SolverReport::default(),
+            estimate: self.estimate(linear),
+        }
+    }
+
+    fn estimate(&self, linear: &LinearAnswer) -> ContactEstimate {
+        ContactEstimate {
+            center: linear.center,
+            radius_mm: linear.contact_radius_mm,
+            touch_mm: linear.press.touch.travel_mm,
+            travel_mm: linear.travel_mm(),
+        }
+    }
+
+    /// Linear surface displacement, fading with depth as the layers share a uniform pressure.
+    fn start<'b>(&self, linear: &'b LinearAnswer) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
+        let layers = self.prepared.scene.tissue.layers();
+        let compliance: Vec<f64> =
+            layers.iter().map(|named| named.layer.thickness_mm / named.layer.youngs_modulus_kpa).collect();
+        let total: f64 = compliance.iter().sum();
+        move |parameter, depth_in_layers| {
+            let above: f64 = compliance
+                .iter()
+                .enumerate()
+                .map(|(layer, c)| c * (depth_in_layers - layer as f64).clamp(0.0, 1.0))
+                .sum();
+            linear.displacement(parameter) * (1.0 - above / total)
+        }
+    }
+
+    fn problem(&self, decision: &Decision) -> Problem<'_> {
+        Problem {
+            patch: self.patch(),
+            tissue: &self.prepared.scene.tissue,
+            tool: self.tool,
+            motion: self.motion,
+            solid: decision.solid,
+        }
+    }
+
+    fn coarse(
+        &self,
+        linear: &LinearAnswer,
+        decision: &Decision,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<FiniteElementAnswer, PredictError> {
+        let topology = shared_topology(COARSE.division(&self.prepared.scene.tissue))?;
+        let (_, solver) = match &mut workspace.coarse {
+            Some(kept) if Arc::ptr_eq(&kept.0, &topology) => kept,
+            slot => {
+                let memory = newton::Workspace::new(&topology.pattern, &topology.symbolic);
+                slot.insert((topology.clone(), memory))
+            }
+        };
+        let start = self.start(linear);
+        self.problem(decision).solve(
+            Level::Coarse.name(),
+            &COARSE,
+            &topology,
+            &self.estimate(linear),
+            &start,
+            solver,
+            progress,
+        )
+    }
+
+    fn reference(
+        &self,
+        linear: &LinearAnswer,
+        decision: &Decision,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<FiniteElementAnswer, PredictError> {
+        // The coarse answer says where the contact ends up; the fine mesh is made for that.
+        let coarse = self.coarse(linear, decision, workspace, progress)?;
+        let topology = shared_topology(REFERENCE.division(&self.prepared.scene.tissue))?;
+        let mut solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
+        let start = self.start(linear);
+        let mut answer = self.problem(decision).solve(
+            Level::Reference.name(),
+            &REFERENCE,
+            &topology,
+            &coarse.estimate,
+            &start,
+            &mut solver,
+            progress,
+        )?;
+        answer.solver.iterations += coarse.solver.iterations;
+        Ok(answer)
+    }
+
+    fn at_rest(&self, mut decision: Decision, reason: &str) -> Prediction {
+        if let Some(contact) = decision.reports.last_mut() {
+            contact.simulated = false;
+            contact.reason = reason.to_owned();
+        }
+        let answer = FiniteElementAnswer {
+            displacements: vec![Vector3::zeros(); self.patch().vertices.len()],
+            travel_mm: 0.0,
+            reaction_mn: Vector3::zeros(),
+            contact: ContactReport {
+                state: ContactState::Clear,
+                area_mm2: 0.0,
+                max_pressure_kpa: 0.0,
+                max_penetration_mm: 0.0,
+                max_strain: 0.0,
+            },
+            solver: SolverReport::default(),
+            estimate: ContactEstimate { center: [0.0; 2], radius_mm: 0.0, touch_mm: 0.0, travel_mm: 0.0 },
+        };
+        self.prediction(answer, decision)
+    }
+
+    /// The answer in scene coordinates.
+    fn prediction(&self, answer: FiniteElementAnswer, decision: Decision) -> Prediction {
+        let patch = self.patch();
+        let deformed: Vec<Point3<f64>> =
+            patch.vertices.iter().zip(&answer.displacements).map(|(vertex, moved)| vertex + moved).collect();
+        let normals = vertex_normals(&deformed, &patch.triangles);
+        let frame = &patch.scene_from_patch;
+        let direction = frame * self.motion.direction.into_inner();
+        let mut warnings = Vec::new();
+        let unused = decision.reports.iter().find(|r| !r.simulated && r.value > r.threshold && r.value.is_some());
+        if let Some(effect) = unused {
+            warnings.push(format!("`{}` is not simulated though the scene calls for it", effect.name));
+        }
+        Prediction {
+            vertices: deformed.iter().map(|vertex| frame * vertex).collect(),
+            normals: normals.iter().map(|normal| frame * normal).collect(),
+            triangles: patch.triangles.clone(),
+            displacement_um: answer.displacements.iter().map(|moved| moved.norm() * 1e3).collect(),
+            source_indices: patch.source_indices.clone(),
+            needle: NeedleOutcome {
+                tip_mm: self.request.needle.tip_mm + direction * answer.travel_mm,
+                travel_mm: answer.travel_mm,
+                reaction_mn: frame * answer.reaction_mn,
+            },
+            contact: answer.contact,
+            level: self.request.level,
+            effects: decision.reports,
+            solver: answer.solver,
+            warnings,
+        }
     }
 }

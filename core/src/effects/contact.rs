@@ -13,7 +13,7 @@
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 
 use crate::effect::{Effect, Local, Stencils};
-use crate::mesh::element::{FACE_NODES, gauss_rule, shapes, top_nodes};
+use crate::mesh::element::{FACE_NODES, gauss_rule, TOP_NODES, shapes};
 use crate::needle::Body;
 
 /// Name of the effect.
@@ -34,7 +34,7 @@ impl ContactFaces {
     /// Faces ζ = 1 of elements, whose nodes are the first vertices of each group of `stencils` (the
     /// last one is the needle), at the rest positions `rest`; `points_per_edge` Gauss points in each direction.
     pub fn new(stencils: &Stencils, rest: &[f64], points_per_edge: usize) -> Self {
-        let top = top_nodes();
+        let top = &*TOP_NODES;
         let rule = gauss_rule(points_per_edge);
         let mut values = Vec::new();
         let mut slopes = Vec::new();

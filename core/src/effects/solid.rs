@@ -11,10 +11,13 @@ use nalgebra::{Matrix3, Matrix4, Vector4};
 use thiserror::Error;
 
 use crate::effect::Stencils;
-use crate::mesh::element::{MODES, NODES, POINTS, quadrature};
+use crate::mesh::element::{MODES, NODES, POINTS, QUADRATURE};
 
 /// One number per node for each component: a row of shape function gradients.
 pub type NodeRows = [[f64; NODES]; 3];
+
+/// Component pairs (row, column) of the lower block triangle of an element matrix.
+const BLOCKS: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 /// A mesh that cannot carry a solid.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -50,7 +53,7 @@ impl SolidGeometry {
     /// # Errors
     /// If an element is inverted or flat at rest.
     pub fn new(stencils: &Stencils, rest: &[f64]) -> Result<Self, SolidGeometryError> {
-        let reference = quadrature();
+        let reference = &*QUADRATURE;
         let elements = stencils.len();
         let mut gradients = Vec::with_capacity(elements * POINTS);
         let mut weights = Vec::with_capacity(elements * POINTS);
@@ -78,7 +81,7 @@ impl SolidGeometry {
             mode_inverse.push(mass.try_inverse().ok_or(inverted)?);
         }
         let mut mode_values = [[0.0; MODES]; POINTS];
-        for (values, point) in mode_values.iter_mut().zip(&reference) {
+        for (values, point) in mode_values.iter_mut().zip(reference.iter()) {
             *values = point.modes;
         }
         Ok(SolidGeometry { gradients, weights, mode_values, mode_inverse })
@@ -101,7 +104,14 @@ impl SolidGeometry {
     pub fn deformation_gradient(&self, element: usize, point: usize, current: &[f64]) -> Matrix3<f64> {
         let gradients = self.gradients(element, point);
         let position = current.as_chunks::<NODES>().0;
-        Matrix3::from_fn(|i, k| dot(&position[i], &gradients[k]))
+        // A loop and not `from_fn`: its closure is not inlined and would leave the vector instructions behind.
+        let mut f = Matrix3::zeros();
+        for i in 0..3 {
+            for k in 0..3 {
+                f[(i, k)] = dot(&position[i], &gradients[k]);
+            }
+        }
+        f
     }
 
     /// Projects point values on the pressure modes and back: the value of the projection at every point.
@@ -154,31 +164,25 @@ impl SolidGeometry {
     ) {
         let rows = out.as_chunks_mut::<NODES>().0;
         for a in 0..NODES {
+            // One pass over the points for all blocks of this row, so that gradients are loaded once.
             let mut isotropic = [0.0; NODES];
+            let mut blocks = [[0.0; NODES]; BLOCKS.len()];
             for q in 0..POINTS {
-                let rest = self.gradients(element, q);
-                for row in rest {
-                    let scale = coefficients[q].rest * row[a];
-                    for b in 0..NODES {
-                        isotropic[b] = row[b].mul_add(scale, isotropic[b]);
+                let (rest, g, c) = (self.gradients(element, q), &spatial[q], &coefficients[q]);
+                let scale = [0, 1, 2].map(|k| c.rest * rest[k][a]);
+                let cross = [0, 1, 2].map(|k| c.cross * g[k][a]);
+                let outer = [0, 1, 2].map(|k| c.outer * g[k][a]);
+                for b in 0..NODES {
+                    isotropic[b] += scale[0] * rest[0][b] + scale[1] * rest[1][b] + scale[2] * rest[2][b];
+                    for (block, &(i, j)) in blocks.iter_mut().zip(&BLOCKS) {
+                        block[b] = g[i][b].mul_add(cross[j], g[j][b].mul_add(outer[i], block[b]));
                     }
                 }
             }
-            for i in 0..3 {
-                for j in 0..=i {
-                    let mut sum = if i == j { isotropic } else { [0.0; NODES] };
-                    for q in 0..POINTS {
-                        let (gi, gj) = (&spatial[q][i], &spatial[q][j]);
-                        let cross = coefficients[q].cross * gj[a];
-                        let outer = coefficients[q].outer * gi[a];
-                        for b in 0..NODES {
-                            sum[b] = gi[b].mul_add(cross, gj[b].mul_add(outer, sum[b]));
-                        }
-                    }
-                    let row = &mut rows[(i * NODES + a) * 3 + j];
-                    for b in 0..NODES {
-                        row[b] += sum[b];
-                    }
+            for (block, &(i, j)) in blocks.iter().zip(&BLOCKS) {
+                let row = &mut rows[(i * NODES + a) * 3 + j];
+                for b in 0..NODES {
+                    row[b] += block[b] + if i == j { isotropic[b] } else { 0.0 };
                 }
             }
         }
@@ -210,17 +214,25 @@ impl SolidGeometry {
             }
         }
         let core = self.mode_inverse[element] * core * self.mode_inverse[element];
-        let rows = out.as_chunks_mut::<NODES>().0;
-        for i in 0..3 {
-            for a in 0..NODES {
-                for m in 0..MODES {
-                    let scale: f64 = (0..MODES).map(|l| core[(m, l)] * integrals[l][i][a]).sum();
-                    for j in 0..=i {
-                        let row = &mut rows[(i * NODES + a) * 3 + j];
-                        for b in 0..NODES {
-                            row[b] = integrals[m][j][b].mul_add(scale, row[b]);
-                        }
+        let mut scaled = [[[0.0; NODES]; 3]; MODES];
+        for m in 0..MODES {
+            for l in 0..MODES {
+                for k in 0..3 {
+                    for a in 0..NODES {
+                        scaled[m][k][a] += core[(m, l)] * integrals[l][k][a];
                     }
+                }
+            }
+        }
+        let rows = out.as_chunks_mut::<NODES>().0;
+        for &(i, j) in &BLOCKS {
+            for a in 0..NODES {
+                let scale = [0, 1, 2, 3].map(|m| scaled[m][i][a]);
+                let row = &mut rows[(i * NODES + a) * 3 + j];
+                for b in 0..NODES {
+                    let first = integrals[0][j][b].mul_add(scale[0], row[b]);
+                    let second = integrals[1][j][b].mul_add(scale[1], integrals[2][j][b] * scale[2]);
+                    row[b] = integrals[3][j][b].mul_add(scale[3], first) + second;
                 }
             }
         }
@@ -238,13 +250,16 @@ pub struct StiffnessCoefficients {
     pub outer: f64,
 }
 
+/// Sum of products in four interleaved parts, so that it vectorises.
 #[inline(always)]
 fn dot(a: &[f64; NODES], b: &[f64; NODES]) -> f64 {
-    let mut sum = 0.0;
-    for k in 0..NODES {
-        sum += a[k] * b[k];
+    let mut parts = [0.0; 4];
+    for (a, b) in a.as_chunks::<4>().0.iter().zip(b.as_chunks::<4>().0) {
+        for k in 0..4 {
+            parts[k] += a[k] * b[k];
+        }
     }
-    sum
+    (parts[0] + parts[1]) + (parts[2] + parts[3])
 }
 
 /// A computation on one element. A trait and not a closure: a closure that is not inlined loses the vector instructions.

@@ -7,6 +7,8 @@
 //! the accuracy of twenty-seven nodes and points at a quarter of the cost.
 //! Not here: geometry of any particular mesh, materials.
 
+use std::sync::LazyLock;
+
 /// Nodes of an element.
 pub const NODES: usize = 20;
 /// Nodes of one of its faces.
@@ -24,15 +26,27 @@ pub fn has_node(offset: [usize; 3]) -> bool {
 }
 
 /// Lattice offsets of the nodes in local order, first coordinate fastest.
-pub fn node_offsets() -> Vec<[usize; 3]> {
-    let all = (0..=ORDER).flat_map(|k| (0..=ORDER).flat_map(move |j| (0..=ORDER).map(move |i| [i, j, k])));
-    all.filter(|&offset| has_node(offset)).collect()
-}
+pub static NODE_OFFSETS: LazyLock<[[usize; 3]; NODES]> = LazyLock::new(|| {
+    let mut offsets = [[0; 3]; NODES];
+    for (offset, node) in offsets.iter_mut().zip(lattice_nodes()) {
+        *offset = node;
+    }
+    offsets
+});
 
 /// Local indices of the nodes of the face ζ = 1, in local order.
-pub fn top_nodes() -> Vec<usize> {
-    let offsets = node_offsets();
-    (0..NODES).filter(|&a| offsets[a][2] == ORDER).collect()
+pub static TOP_NODES: LazyLock<[usize; FACE_NODES]> = LazyLock::new(|| {
+    let mut top = [0; FACE_NODES];
+    let on_top = (0..NODES).filter(|&a| NODE_OFFSETS[a][2] == ORDER);
+    for (slot, node) in top.iter_mut().zip(on_top) {
+        *slot = node;
+    }
+    top
+});
+
+fn lattice_nodes() -> Vec<[usize; 3]> {
+    let all = (0..=ORDER).flat_map(|k| (0..=ORDER).flat_map(move |j| (0..=ORDER).map(move |i| [i, j, k])));
+    all.filter(|&offset| has_node(offset)).collect()
 }
 
 /// Value and gradient of one shape function at a point of the reference cube.
@@ -56,7 +70,9 @@ pub struct QuadraturePoint {
 }
 
 /// Irons' fourteen-point rule with the shape functions at its points.
-pub fn quadrature() -> Vec<QuadraturePoint> {
+pub static QUADRATURE: LazyLock<Vec<QuadraturePoint>> = LazyLock::new(quadrature);
+
+fn quadrature() -> Vec<QuadraturePoint> {
     let face = (19.0_f64 / 30.0).sqrt();
     let corner = (19.0_f64 / 33.0).sqrt();
     let mut rule = Vec::with_capacity(POINTS);
@@ -82,7 +98,7 @@ pub fn quadrature() -> Vec<QuadraturePoint> {
 /// Every shape function at the point `at` of the reference cube, in local node order.
 pub fn shapes(at: [f64; 3]) -> [Shape; NODES] {
     let mut out = [Shape::default(); NODES];
-    for (shape, offset) in out.iter_mut().zip(node_offsets()) {
+    for (shape, offset) in out.iter_mut().zip(NODE_OFFSETS.iter()) {
         *shape = serendipity(at, offset.map(|o| o as f64 - 1.0));
     }
     out

@@ -1,6 +1,6 @@
 //! Reads the deformed inner surface at points given by their patch parameters.
 
-use super::element::{shapes, top_nodes};
+use super::element::{TOP_NODES, shapes};
 use super::wall::{WallGeometry, WallTopology};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -36,7 +36,7 @@ pub fn locate(topology: &WallTopology, geometry: &WallGeometry, at: [f64; 2]) ->
 
 /// Shape function values at the point of the face whose image is `at`, if it lies in the face.
 fn invert(nodes: &[[f64; 2]], at: [f64; 2]) -> Option<Vec<f64>> {
-    let top = top_nodes();
+    let top = &*TOP_NODES;
     let mut local = Vector2::zeros();
     for _ in 0..INVERSION_STEPS {
         let shapes = shapes([local[0], local[1], 1.0]);

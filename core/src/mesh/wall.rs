@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use thiserror::Error;
 
 use super::disc::{DiscGeometry, DiscTopology};
-use super::element::{NODES, ORDER, node_offsets, top_nodes};
+use super::element::{NODE_OFFSETS, NODES, ORDER, TOP_NODES};
 use super::ordering::nested_dissection;
 use crate::assemble::{Dofs, Pattern};
 use crate::effect::Stencils;
@@ -80,14 +80,14 @@ impl WallTopology {
             .flat_map(|(layer, &count)| std::iter::repeat_n(layer, count))
             .collect();
 
-        let offsets = node_offsets();
+        let offsets = &*NODE_OFFSETS;
         let lattice = |cell: &[usize], layer: usize, [i, j, k]: [usize; 3]| {
             (cell[j * (ORDER + 1) + i], layer * ORDER + k)
         };
         let mut used: HashMap<usize, Vec<usize>> = HashMap::new();
         for cell in &cells {
             for layer in 0..layers.len() {
-                for &offset in &offsets {
+                for &offset in offsets {
                     let (point, level) = lattice(cell, layer, offset);
                     used.entry(point).or_default().push(level);
                 }
@@ -115,9 +115,8 @@ impl WallTopology {
                 elements.vertices.extend(offsets.iter().map(|&o| index[&lattice(cell, at, o)] as u32));
                 element_layer.push(layer);
             }
-            let top = top_nodes();
             let face: Vec<usize> =
-                top.iter().map(|&a| index[&lattice(cell, layers.len() - 1, offsets[a])]).collect();
+                TOP_NODES.iter().map(|&a| index[&lattice(cell, layers.len() - 1, offsets[a])]).collect();
             faces.group_size = face.len() + 1;
             faces.vertices.extend(face.iter().map(|&v| v as u32));
             faces.vertices.push(needle as u32);
@@ -163,6 +162,8 @@ pub struct WallGeometry {
     pub parameters: Vec<[f64; 2]>,
     /// Rest positions of all vertices, x, y, z each, the needle's (zero here) last [mm].
     pub rest: Vec<f64>,
+    /// Depth of each vertex but the needle's in layers: 1.5 is the middle of the second layer.
+    pub layer_coordinates: Vec<f64>,
     /// Rest geometry of the elements.
     pub solid: SolidGeometry,
 }
@@ -185,35 +186,47 @@ impl WallGeometry {
         let mut rest = Vec::with_capacity(3 * topology.vertices.len() + 3);
         for &(point, level) in &topology.vertices {
             let column = &columns[point];
-            let (thinning_depth, full_depth) = levels[level];
+            let level = levels[level];
             let scale = if retina > 0.0 { (retina - column.retina_thinning_mm) / retina } else { 1.0 };
-            let depth = thinning_depth * scale + full_depth;
+            let depth = level.thinning * scale + level.full;
             let position = column.surface + column.inward.into_inner() * depth;
             rest.extend_from_slice(position.coords.as_slice());
         }
         rest.extend_from_slice(&[0.0; 3]);
         let solid = SolidGeometry::new(&topology.elements, &rest)?;
-        Ok(WallGeometry { parameters, rest, solid })
+        let layer_coordinates =
+            topology.vertices.iter().map(|&(_, level)| levels[level].layer_coordinate).collect();
+        Ok(WallGeometry { parameters, rest, layer_coordinates, solid })
     }
 }
 
-/// Depth of each lattice level at full thickness: (within layers that thin, within the others) [mm].
-fn levels(topology: &WallTopology, layers: &[LayerThickness]) -> Vec<(f64, f64)> {
-    let mut from_surface = vec![(0.0, 0.0)];
-    let mut depth = (0.0, 0.0);
+/// Where a lattice level lies at full thickness.
+#[derive(Clone, Copy, Debug, Default)]
+struct Level {
+    /// Depth within layers that thin [mm].
+    thinning: f64,
+    /// Depth within the others [mm].
+    full: f64,
+    /// Layers above it, the last one in part: 1.5 is the middle of the second layer.
+    layer_coordinate: f64,
+}
+
+/// Every lattice level, from the base to the surface.
+fn levels(topology: &WallTopology, layers: &[LayerThickness]) -> Vec<Level> {
+    let mut from_surface = vec![Level::default()];
+    let mut top = Level::default();
     for (layer, &count) in layers.iter().zip(&topology.division.elements_per_layer) {
-        for _ in 0..count {
-            let thickness = layer.thickness_mm / count as f64;
-            for step in 1..=ORDER {
-                let within = thickness * step as f64 / ORDER as f64;
-                from_surface.push(if layer.thins { (depth.0 + within, depth.1) } else { (depth.0, depth.1 + within) });
-            }
-            if layer.thins {
-                depth.0 += thickness;
-            } else {
-                depth.1 += thickness;
-            }
+        let steps = count * ORDER;
+        for step in 1..=steps {
+            let mut level = top;
+            let share = step as f64 / steps as f64;
+            level.layer_coordinate += share;
+            let depth = if layer.thins { &mut level.thinning } else { &mut level.full };
+            *depth += share * layer.thickness_mm;
+            from_surface.push(level);
         }
+        top = from_surface[from_surface.len() - 1];
+        top.layer_coordinate = top.layer_coordinate.round();
     }
     from_surface.reverse();
     from_surface

@@ -90,8 +90,8 @@ pub struct ContactEstimate {
 
 /// Smallest contact radius that a mesh is made for, in needle radii.
 const SMALLEST_CONTACT: f64 = 0.05;
-/// Share of the estimated way beyond first touch at which the solve starts.
-const START_SHARE: f64 = 0.5;
+/// How much further than estimated the needle stands at the start of a solve, so that the contact is closed [mm].
+const START_OVERLAP_MM: f64 = 5e-4;
 
 /// The answer of a finite-element level, patch frame.
 pub struct FiniteElementAnswer {
@@ -135,7 +135,8 @@ impl Problem<'_> {
         DiscGeometry { center: estimate.center, radii }
     }
 
-    /// Solves on a mesh of `topology` around the estimated contact.
+    /// Solves on a mesh of `topology` around the estimated contact, from the displacements `start` (patch parameters and depth in layers
+    /// in, displacement out).
     ///
     /// # Errors
     /// [`PredictError::Mesh`], [`PredictError::Solver`].
@@ -145,6 +146,7 @@ impl Problem<'_> {
         resolution: &Resolution,
         topology: &WallTopology,
         estimate: &ContactEstimate,
+        start: &dyn Fn([f64; 2], f64) -> Vector3<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
@@ -153,12 +155,14 @@ impl Problem<'_> {
         let wall =
             Wall::new(topology, &self.patch.surface, self.tissue, &disc, self.solid, resolution.contact, self.tool)?;
         let touch_mm = wall.touch(&self.motion.direction, estimate.touch_mm).unwrap_or(estimate.touch_mm);
-        let beyond = estimate.travel_mm - estimate.touch_mm;
         let motion = match self.motion.force_mn {
-            Some(_) => Motion { travel_mm: touch_mm + START_SHARE * beyond, ..self.motion },
+            Some(_) => {
+                let beyond = (estimate.travel_mm - estimate.touch_mm).max(0.0);
+                Motion { travel_mm: touch_mm + beyond + START_OVERLAP_MM, ..self.motion }
+            }
             None => self.motion,
         };
-        let mut positions = wall.start();
+        let mut positions = wall.displaced(start);
         wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm));
         progress.stage("equilibrium");
         let equilibrium = wall

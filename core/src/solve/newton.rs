@@ -7,7 +7,8 @@
 //!
 //! Two ways to use the step ([`Globalization`]):
 //! - `PredictedStress`: full steps; the Hessian's stress-dependent part uses the stresses that the last linear step predicted
-//!   ([`crate::effect::Effect::predict_stress`]). From an unloaded start it converges in six to nine steps where the guarded method needs
+//!   ([`crate::effect::Effect::predict_stress`]), and none while the residual is far from zero: stresses mean little there, and without
+//!   them the Hessian is positive definite. From an unloaded start it converges in six to nine steps where the guarded method needs
 //!   twice as many and raises the diagonal in half of them. Only inversion shortens a step. It may fail, and says so.
 //! - `LineSearch`: the exact Hessian, and no step that increases Π or that an effect vetoes. Slow and sure.
 //!
@@ -49,6 +50,8 @@ pub enum Globalization {
 pub struct NewtonSettings {
     /// How steps are guarded.
     pub globalization: Globalization,
+    /// Size of the forces at play [mN].
+    pub force_scale_mn: f64,
     /// Largest residual force: Euclidean norm over all unknowns [mN].
     pub tolerance_mn: f64,
     /// Largest number of iterations.
@@ -160,7 +163,7 @@ impl Workspace {
 struct Trial {
     /// Positions at the beginning of the solve.
     start: Vec<f64>,
-    /// Π at the last accepted positions.
+    /// Π at the last accepted positions; used by the line search alone.
     potential: f64,
     /// The last step in the layout of positions.
     moved: Vec<f64>,
@@ -174,6 +177,8 @@ const SHIFT_GROWTH: f64 = 10.0;
 const FIRST_SHIFT: f64 = 1e-4;
 /// Shifts tried before giving up.
 const MAX_SHIFTS: usize = 8;
+/// Residual over force scale above which predicted stresses are not yet used.
+const STRESS_STIFFNESS_BELOW: f64 = 0.1;
 /// Halvings tried in one line search.
 const MAX_HALVINGS: usize = 30;
 /// Share of the predicted decrease that a step must achieve (Armijo).
@@ -230,7 +235,10 @@ impl System<'_> {
         let start = positions.to_vec();
         let mut report = NewtonReport::default();
         let mut trial = Trial {
-            potential: self.potential(positions, &start, drive, &mut workspace.scratch),
+            potential: match settings.globalization {
+                Globalization::PredictedStress => 0.0,
+                Globalization::LineSearch => self.potential(positions, &start, drive, &mut workspace.scratch),
+            },
             start,
             moved: vec![0.0; positions.len()],
             predicted: match settings.globalization {
@@ -238,10 +246,10 @@ impl System<'_> {
                 Globalization::LineSearch => Predicted::default(),
             },
         };
-        if !trial.potential.is_finite() {
+        report.residual_mn = self.residual(positions, drive, workspace);
+        if !report.residual_mn.is_finite() {
             return Err(self.bad_start(positions, &mut workspace.scratch));
         }
-        report.residual_mn = self.residual(positions, drive, workspace);
         while report.residual_mn > settings.tolerance_mn {
             if report.iterations >= settings.max_iterations {
                 return Err(NewtonError::NotConverged {
@@ -259,7 +267,9 @@ impl System<'_> {
             let (step, slope) = self.step(drive, settings, workspace)?;
             report.iterations += 1;
             let taken = match settings.globalization {
-                Globalization::PredictedStress => self.full_step(positions, &step, &mut trial, drive, workspace),
+                Globalization::PredictedStress => {
+                    self.full_step(positions, &step, &mut trial, drive, settings.force_scale_mn, workspace)
+                },
                 Globalization::LineSearch => self.line_search(positions, &step, slope, &mut trial, drive, workspace),
             };
             let stuck =
@@ -267,7 +277,6 @@ impl System<'_> {
             let (halvings, residual_mn) = taken.ok_or(stuck)?;
             report.halvings += halvings;
             report.residual_mn = residual_mn;
-            if std::env::var("DBG").is_ok() { let f=self.dofs.free; eprintln!("  it {} res {:.3e} halv {} shifts {} travel {:.5} |step| {:.3e}", report.iterations, residual_mn, report.halvings, report.shifts, (step[f]*step[f]+step[f+1]*step[f+1]+step[f+2]*step[f+2]).sqrt(), step.iter().fold(0.0f64,|a,b|a.max(b.abs()))); }
         }
         Ok(report)
     }
@@ -280,6 +289,7 @@ impl System<'_> {
         step: &[f64],
         trial: &mut Trial,
         drive: Drive,
+        force_scale_mn: f64,
         workspace: &mut Workspace,
     ) -> Option<(usize, f64)> {
         let before = positions.to_vec();
@@ -289,6 +299,10 @@ impl System<'_> {
             self.dofs.advance(positions, step, scale);
             let residual_mn = self.residual(positions, drive, workspace);
             if residual_mn.is_finite() {
+                if residual_mn > STRESS_STIFFNESS_BELOW * force_scale_mn {
+                    trial.predicted.clear();
+                    return Some((halvings, residual_mn));
+                }
                 trial.moved.fill(0.0);
                 self.dofs.advance(&mut trial.moved, step, scale);
                 predict_stress(self.terms, &before, &trial.moved, &mut workspace.scratch, &mut trial.predicted);

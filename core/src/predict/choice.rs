@@ -1,0 +1,83 @@
+//! Which effects a request calls for, and why.
+
+use super::types::{EffectChoice, EffectReport, Level, PredictError};
+use crate::effects::{EFFECT_NAMES, contact, elasticity, finite_strain};
+use crate::equilibrium::Solid;
+
+/// Error that `auto` accepts for leaving an effect out [µm]: a tenth of the best published tool-to-layer error (9 µm).
+pub const AUTO_TOLERANCE_UM: f64 = 1.0;
+
+/// The decision.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decision {
+    /// Which solid energy.
+    pub solid: Solid,
+    /// Whether the needle is seen at all.
+    pub contact: bool,
+    /// The report, in the order of [`EFFECT_NAMES`].
+    pub reports: Vec<EffectReport>,
+}
+
+/// What the linear answer predicts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Expected {
+    /// Depth of the needle [mm].
+    pub depth_mm: f64,
+    /// That depth over the thickness of what yields (retina and choroid): a mean strain.
+    pub strain: f64,
+}
+
+/// Decides for `choice` at `level`.
+///
+/// # Errors
+/// [`PredictError::Effect`] for a name that does not exist or a list without a solid.
+pub fn decide(choice: &EffectChoice, level: Level, expected: Expected) -> Result<Decision, PredictError> {
+    // A strain ε changes the answer by the order of ε times itself.
+    let linearisation_error_um = expected.strain * expected.depth_mm * 1e3;
+    let called_for = linearisation_error_um > AUTO_TOLERANCE_UM;
+    let (wanted, contact, why) = match choice {
+        EffectChoice::Auto => (called_for, true, None),
+        EffectChoice::All => (true, true, Some("asked for with `all`")),
+        EffectChoice::Named(names) => {
+            let has = |name: &str| names.iter().any(|n| n == name);
+            if let Some(name) = names.iter().find(|n| !EFFECT_NAMES.contains(&n.as_str())) {
+                let problem = format!("does not exist; known: {}", EFFECT_NAMES.join(", "));
+                return Err(PredictError::Effect { name: name.clone(), problem });
+            }
+            if !has(elasticity::NAME) && !has(finite_strain::NAME) {
+                let problem = "is left out, and so is `finite_strain`; tissue needs one of them".to_owned();
+                return Err(PredictError::Effect { name: elasticity::NAME.to_owned(), problem });
+            }
+            (has(finite_strain::NAME), has(contact::NAME), Some("as listed in the request"))
+        }
+    };
+    let possible = level != Level::Linear;
+    let finite = wanted && possible;
+    let reason = match (why, possible) {
+        (_, false) => "level `linear` is small-strain by construction".to_owned(),
+        (Some(why), _) => why.to_owned(),
+        (None, _) if called_for => "the linear answer's strain times its depth exceeds what may be neglected [µm]".to_owned(),
+        (None, _) => "the linear answer's strain times its depth may be neglected [µm]".to_owned(),
+    };
+    let plain = |name, simulated, reason: &str| EffectReport {
+        name,
+        simulated,
+        reason: reason.to_owned(),
+        value: None,
+        threshold: None,
+    };
+    let elastic = if finite { "contained in `finite_strain`" } else { "always" };
+    let reports = vec![
+        plain(elasticity::NAME, true, elastic),
+        EffectReport {
+            name: finite_strain::NAME,
+            simulated: finite,
+            reason,
+            value: Some(linearisation_error_um),
+            threshold: Some(AUTO_TOLERANCE_UM),
+        },
+        plain(contact::NAME, contact, if contact { "the needle reaches the surface" } else { "as listed in the request" }),
+    ];
+    let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
+    Ok(Decision { solid, contact, reports })
+}
