@@ -41,7 +41,6 @@ pub fn predict(
     stopwatch: &mut Stopwatch,
     layout: Layout,
 ) -> Result<Vec<u8>, Problem> {
-    stopwatch.stage("predict");
     let prediction = scene
         .predict(request, workspace, stopwatch)
         .map_err(from_predict)?;

@@ -47,9 +47,9 @@ pub struct Config {
     /// Memory for the prepared scenes of requests, MiB. The built-in ones come on top.
     #[arg(long, env = "RETINA_SCENE_CACHE_MIB", default_value_t = 64)]
     pub scene_cache_mib: u16,
-    /// Seconds after which the work on a request is stopped.
-    #[arg(long, env = "RETINA_TIME_LIMIT_S", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..))]
-    pub time_limit_s: u16,
+    /// Milliseconds after which the work on a request is stopped.
+    #[arg(long, env = "RETINA_TIME_LIMIT_MS", default_value_t = 30_000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub time_limit_ms: u32,
     /// Form of the log on standard error. RUST_LOG says what is logged; `retina_server=debug` has a line for each request.
     #[arg(long, env = "RETINA_LOG", default_value = "pretty")]
     pub log: LogForm,
@@ -84,13 +84,13 @@ impl Config {
         self.threads.map_or_else(cores, usize::from)
     }
 
-    /// Memory for the prepared scenes of requests [bytes].
+    /// Memory for the prepared scenes of requests, bytes.
     pub fn scene_cache_bytes(&self) -> usize {
         usize::from(self.scene_cache_mib) << 20
     }
 
     /// How long the work on a request may take.
     pub fn time_limit(&self) -> Duration {
-        Duration::from_secs(self.time_limit_s.into())
+        Duration::from_millis(self.time_limit_ms.into())
     }
 }

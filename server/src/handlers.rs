@@ -2,14 +2,15 @@
 
 use axum::Json;
 use axum::body::Body;
+use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, Method, Uri, header};
 use axum::response::{Html, IntoResponse, Response};
 
+use crate::catalog;
 use crate::problem::{Kind, MEDIA_TYPE, Problem, ProblemDocument};
 use crate::state::AppState;
 use crate::wire::{GaugeList, LevelList, PredictRequest, PredictResponse, Readiness, SceneList};
-use crate::{body, catalog};
 
 /// What the surface looks like when a needle at this pose pushes with this force.
 #[utoipa::path(
@@ -33,8 +34,7 @@ pub async fn predict(
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, Problem> {
-    let body = body::json(&headers, body).await?;
-    let answer = app.answer(body).await?;
+    let answer = app.answer(&headers, body).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], answer).into_response())
 }
 
@@ -88,7 +88,9 @@ pub async fn ready(State(app): State<AppState>) -> Result<Json<Readiness>, Probl
         (status = 404, description = "No such problem", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
     )
 )]
-pub async fn problem(Path(name): Path<String>) -> Result<String, Problem> {
+pub async fn problem(name: Result<Path<String>, PathRejection>) -> Result<String, Problem> {
+    // A name that is not UTF-8 is none of ours either.
+    let name = name.map_or_else(|_| String::new(), |Path(name)| name);
     let kind = Kind::ALL.iter().find(|kind| kind.name() == name);
     let kind = kind.ok_or_else(|| {
         let known: Vec<&str> = Kind::ALL.iter().map(|kind| kind.name()).collect();

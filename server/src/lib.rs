@@ -1,6 +1,6 @@
 //! The service: needle pose and force in, deformed retina surface and normals out, over HTTP or from a file.
 //!
-//! Read in this order: [`routes`] (every URL), `handlers`, [`wire`] (every message), `understand` (from the wire to the core),
+//! Read in this order: `routes` (every URL), `handlers`, [`wire`] (every message), `understand` (from the wire to the core),
 //! `answer` (one request from bytes to bytes), `pool` and `scenes` (where it runs and what is kept). [`config`] is what the
 //! program can be told, [`problem`] how it says no.
 //!
@@ -12,7 +12,7 @@ mod catalog;
 pub mod cli;
 pub mod config;
 mod handlers;
-mod pool;
+pub mod pool;
 pub mod problem;
 mod read;
 mod routes;
@@ -22,7 +22,7 @@ mod state;
 mod stopwatch;
 mod understand;
 pub mod wire;
-mod write;
+pub mod write;
 
 pub use config::Config;
 pub use routes::app;

@@ -15,6 +15,9 @@ use crate::understand::{self, DEFAULT_SCENE};
 use crate::wire::SceneSpec;
 use crate::wire::request::SceneChoice;
 
+/// Scenes of requests that are kept, however small: each is looked at when room is made.
+const MOST_INLINE: usize = 256;
+
 /// A place for a scene. Its lock is held while the scene is prepared, so whoever wants the same scene waits for it.
 type Slot = Mutex<Option<Arc<PreparedScene>>>;
 
@@ -103,7 +106,7 @@ impl Scenes {
         {
             inline.entries.remove(key);
         }
-        while inline.bytes() > self.limit_bytes {
+        while inline.entries.len() > MOST_INLINE || inline.bytes() > self.limit_bytes {
             let idle = inline
                 .entries
                 .iter()
@@ -116,7 +119,7 @@ impl Scenes {
         }
     }
 
-    /// Memory of the scenes of requests, keys included [bytes].
+    /// Memory of the scenes of requests, keys included, bytes.
     pub fn inline_bytes(&self) -> usize {
         lock(&self.inline).bytes()
     }

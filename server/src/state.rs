@@ -4,13 +4,17 @@ use std::io;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
+use axum::body::Body;
+use axum::http::HeaderMap;
 use nalgebra::{Point3, Vector3};
 use retina_core::needle::shape::RADIUS;
 use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::{Control, EffectChoice, Level, Request, Workspace};
 use retina_core::scene::Scene;
+use tokio::sync::Semaphore;
 
 use crate::answer::{answer, predict};
+use crate::body::{self, LARGE_AT_ONCE};
 use crate::config::Config;
 use crate::pool::{Pool, PoolError};
 use crate::problem::{Kind, Problem};
@@ -22,6 +26,9 @@ use crate::write::Layout;
 /// Force of the warm-up on every built-in scene, mN: enough for contact, far from any limit.
 const WARM_UP_FORCE_MN: f64 = 0.1;
 
+/// How long each prediction of the warm-up may take.
+const WARM_UP_LIMIT: Duration = Duration::from_secs(60);
+
 /// Shared by all requests.
 pub type AppState = Arc<App>;
 
@@ -29,6 +36,7 @@ pub type AppState = Arc<App>;
 pub struct App {
     scenes: Arc<Scenes>,
     pool: Pool,
+    large_bodies: Arc<Semaphore>,
     warm_up: Arc<OnceLock<Result<(), Problem>>>,
     time_limit: Duration,
 }
@@ -45,7 +53,7 @@ impl App {
         let first = {
             let (scenes, outcome) = (Arc::clone(&scenes), Arc::clone(&warm_up));
             move |workspace: &mut Workspace| {
-                let result = prepare_built_in(&scenes, workspace, time_limit);
+                let result = prepare_built_in(&scenes, workspace);
                 if let Err(problem) = &result {
                     tracing::error!(detail = %problem.detail, "the built-in scenes could not be prepared");
                 }
@@ -55,20 +63,19 @@ impl App {
         };
         Ok(Arc::new(Self {
             pool: Pool::start(config.threads(), config.queue.into(), first)?,
+            large_bodies: Arc::new(Semaphore::new(LARGE_AT_ONCE)),
             scenes,
             warm_up,
             time_limit,
         }))
     }
 
-    /// Answers the request in `body`, which arrived just now.
+    /// Answers the request whose body is on its way.
     ///
     /// # Errors
     /// The problem that the caller is told of.
-    pub async fn answer(
-        &self,
-        body: impl AsRef<[u8]> + Send + 'static,
-    ) -> Result<Vec<u8>, Problem> {
+    pub async fn answer(&self, headers: &HeaderMap, body: Body) -> Result<Vec<u8>, Problem> {
+        let body = body::json(headers, body, &self.large_bodies).await?;
         let accepted = Instant::now();
         let (scenes, limit) = (Arc::clone(&self.scenes), self.time_limit);
         let job = move |workspace: &mut Workspace, abandoned: &dyn Fn() -> bool| {
@@ -109,11 +116,7 @@ impl App {
 }
 
 /// A light touch on every built-in scene, so that what depends on the scene alone is there before the first request.
-fn prepare_built_in(
-    scenes: &Scenes,
-    workspace: &mut Workspace,
-    limit: Duration,
-) -> Result<(), Problem> {
+fn prepare_built_in(scenes: &Scenes, workspace: &mut Workspace) -> Result<(), Problem> {
     let shape = NeedleShape::hemispherical(RADIUS.default);
     let needle = Needle::pointing(shape, Point3::origin(), &-Vector3::z_axis());
     for name in Scene::built_in_names() {
@@ -125,7 +128,7 @@ fn prepare_built_in(
                 level,
                 effects: EffectChoice::Auto,
             };
-            let mut stopwatch = Stopwatch::start(Instant::now(), limit, &|| false);
+            let mut stopwatch = Stopwatch::start(Instant::now(), WARM_UP_LIMIT, &|| false);
             predict(&scene, &request, workspace, &mut stopwatch, Layout::Compact)?;
         }
     }

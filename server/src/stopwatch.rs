@@ -8,7 +8,7 @@ use retina_core::progress::Progress;
 
 /// Times stages; asks for a stop when nobody waits for the answer or the time is up.
 pub struct Stopwatch<'a> {
-    stages: Vec<(&'static str, f64)>,
+    stages: Vec<(&'static str, Duration)>,
     current: &'static str,
     since: Instant,
     deadline: Instant,
@@ -20,7 +20,7 @@ impl<'a> Stopwatch<'a> {
     pub fn start(accepted: Instant, limit: Duration, abandoned: &'a dyn Fn() -> bool) -> Self {
         let now = Instant::now();
         Self {
-            stages: vec![("queue", micros(now - accepted))],
+            stages: vec![("queue", now - accepted)],
             current: "read",
             since: now,
             deadline: now + limit,
@@ -28,8 +28,8 @@ impl<'a> Stopwatch<'a> {
         }
     }
 
-    /// Ends the last stage; the stages so far with their times, µs.
-    pub fn finish(&mut self) -> &[(&'static str, f64)] {
+    /// Ends the last stage; the stages so far with their times.
+    pub fn finish(&mut self) -> &[(&'static str, Duration)] {
         self.lap();
         &self.stages
     }
@@ -37,15 +37,15 @@ impl<'a> Stopwatch<'a> {
     /// A stage that comes again adds to its first time.
     fn lap(&mut self) {
         let now = Instant::now();
-        let time_us = micros(now - self.since);
+        let time = now - self.since;
         self.since = now;
         match self
             .stages
             .iter_mut()
             .find(|(name, _)| *name == self.current)
         {
-            Some((_, total)) => *total += time_us,
-            None => self.stages.push((self.current, time_us)),
+            Some((_, total)) => *total += time,
+            None => self.stages.push((self.current, time)),
         }
     }
 }
@@ -59,8 +59,4 @@ impl Progress for Stopwatch<'_> {
     fn interrupted(&mut self) -> bool {
         (self.abandoned)() || Instant::now() >= self.deadline
     }
-}
-
-fn micros(duration: Duration) -> f64 {
-    duration.as_nanos() as f64 * 1e-3
 }

@@ -116,6 +116,10 @@ fn every_kind_of_problem_has_a_page() {
         "{}",
         page.body
     );
+    assert_eq!(
+        get("/problems/%ff").media_type(),
+        "application/problem+json"
+    );
     let known = get("/problems/nothing");
     assert_eq!(known.status, 404);
     let detail = known.body["detail"].as_str().expect("detail");

@@ -31,7 +31,8 @@ fn main() {
     let stream = TcpStream::connect(address).expect("connection");
     stream.set_nodelay(true).expect("nodelay");
     let mut reader = BufReader::new(stream);
-    let (mut round_trips, mut overheads) = (Vec::new(), Vec::new());
+    let (mut round_trips, mut overheads, mut queues, mut reads) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for index in 0..count + count / 10 {
         // A little elsewhere each time, so that nothing is answered from memory.
         let x = 0.3 * ((index as f64) * 0.618).fract() - 0.15;
@@ -52,6 +53,8 @@ fn main() {
                 .iter()
                 .filter(|(name, _)| !OWN_STAGES.contains(&name.as_str()));
             let core: f64 = core.filter_map(|(_, time)| time.as_f64()).sum();
+            queues.push(stages["queue"].as_f64().expect("number"));
+            reads.push(stages["read"].as_f64().expect("number"));
             round_trips.push(round_trip);
             overheads.push(round_trip - core);
         }
@@ -59,6 +62,8 @@ fn main() {
     println!("{level}, {count} requests on one kept connection, µs");
     println!("round trip: {}", summary(&mut round_trips));
     println!("overhead:   {}", summary(&mut overheads));
+    println!("  of it queue: {}", summary(&mut queues));
+    println!("  of it read:  {}", summary(&mut reads));
 }
 
 /// The service as the program runs it: one thread that talks, one that computes.

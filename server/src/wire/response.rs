@@ -1,5 +1,7 @@
 //! The answer of `POST /v1/predict`, written straight from the core's prediction without a copy.
 
+use std::time::Duration;
+
 use nalgebra::{Point3, Vector3};
 use retina_core::predict::{ContactState, EffectReport, Prediction, SolverReport};
 use serde::ser::{SerializeMap, SerializeSeq};
@@ -130,15 +132,16 @@ pub struct SolverAnswer {
 pub struct TimeAnswer<'a> {
     /// All stages together, µs.
     pub total: f64,
-    /// By stage, µs: `queue`, `read`, `prepare` and then those of the level.
+    /// By stage, µs: `queue` (the wait for a thread), `read` (the body), `prepare` (finding the scene, or making it) and then those of the
+    /// level.
     #[serde(serialize_with = "stages")]
     #[schema(value_type = std::collections::BTreeMap<String, f64>)]
-    pub stages: &'a [(&'static str, f64)],
+    pub stages: &'a [(&'static str, Duration)],
 }
 
 impl<'a> PredictResponse<'a> {
-    /// The answer that tells of `prediction`, which took the stages (names and µs) that are given.
-    pub fn new(prediction: &'a Prediction, stages: &'a [(&'static str, f64)]) -> Self {
+    /// The answer that tells of `prediction`, which took the stages that are given.
+    pub fn new(prediction: &'a Prediction, stages: &'a [(&'static str, Duration)]) -> Self {
         let Prediction {
             needle, contact, ..
         } = prediction;
@@ -171,7 +174,7 @@ impl<'a> PredictResponse<'a> {
             effects: prediction.effects.iter().map(EffectAnswer::from).collect(),
             solver: SolverAnswer::from(&prediction.solver),
             time_us: TimeAnswer {
-                total: stages.iter().map(|(_, time_us)| time_us).sum(),
+                total: micros(stages.iter().map(|(_, time)| *time).sum()),
                 stages,
             },
             warnings: &prediction.warnings,
@@ -219,12 +222,17 @@ fn vectors<S: Serializer>(vectors: &&[Vector3<f64>], serializer: S) -> Result<S:
 }
 
 fn stages<S: Serializer>(
-    stages: &&[(&'static str, f64)],
+    stages: &&[(&'static str, Duration)],
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
     let mut map = serializer.serialize_map(Some(stages.len()))?;
-    for (name, time_us) in *stages {
-        map.serialize_entry(name, time_us)?;
+    for (name, time) in *stages {
+        map.serialize_entry(name, &micros(*time))?;
     }
     map.end()
+}
+
+/// Whole nanoseconds over a thousand, so that the text has three digits after the point at most.
+fn micros(time: Duration) -> f64 {
+    time.as_nanos() as f64 / 1e3
 }
