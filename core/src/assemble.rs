@@ -225,7 +225,9 @@ fn for_each_active(
 /// Total energy [µJ] at `positions` (x, y, z of each vertex); infinite if any effect vetoes them.
 pub fn energy(terms: &[Term], positions: &[f64], scratch: &mut Scratch) -> f64 {
     let mut total = 0.0;
-    for_each_active(terms, positions, &Predicted::default(), scratch, |_, term, local, _, _| total += term.effect.energy(local));
+    for_each_active(terms, positions, &Predicted::default(), scratch, |_, term, local, _, _| {
+        total += term.effect.energy(local)
+    });
     total
 }
 

@@ -109,7 +109,7 @@ pub struct ContactSummary {
 }
 
 /// Residual relative to the force scale at which Newton stops.
-const RELATIVE_TOLERANCE: f64 = 1e-8;
+const RELATIVE_TOLERANCE: f64 = 1e-7;
 /// Force scale under pose control [mN]: that of a light touch.
 const POSE_FORCE_SCALE_MN: f64 = 0.01;
 /// Smallest force scale [mN]: below it rounding of the tissue's stresses decides.
@@ -120,6 +120,8 @@ const ATTEMPTS: [Attempt; 3] = [
     Attempt { load_steps: 6, globalization: Globalization::PredictedStress, max_iterations: 20 },
     Attempt { load_steps: 12, globalization: Globalization::LineSearch, max_iterations: 100 },
 ];
+/// Iterations in which the needle waits for the tissue.
+const HELD_ITERATIONS: usize = 1;
 /// Share of the remaining way by which the needle overlaps the tissue at the start of load steps.
 const FIRST_OVERLAP: f64 = 0.05;
 /// Largest travel in one Newton iteration, in needle radii.
@@ -318,6 +320,7 @@ impl<'a> Wall<'a> {
             force_scale_mn: scale,
             tolerance_mn: RELATIVE_TOLERANCE * scale,
             max_iterations: attempt.max_iterations,
+            held_iterations: HELD_ITERATIONS,
             max_travel_mm: MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
         };
         let mut total = NewtonReport::default();
@@ -400,7 +403,8 @@ impl<'a> Wall<'a> {
                 let f = self.geometry.solid.deformation_gradient(element, point, &local);
                 // |σ − 1| ≤ ‖F − 1‖ for every principal stretch σ: only candidates are worth an eigenvalue problem.
                 if (f - Matrix3::identity()).norm() > largest {
-                    let stretches = (f.transpose() * f).symmetric_eigenvalues().map(|l| (l.max(0.0).sqrt() - 1.0).abs());
+                    let stretches =
+                        (f.transpose() * f).symmetric_eigenvalues().map(|l| (l.max(0.0).sqrt() - 1.0).abs());
                     largest = largest.max(stretches.max());
                 }
             }

@@ -51,16 +51,8 @@ pub struct Needle {
 
 impl Needle {
     /// A needle that points along `direction` (scene coordinates), turned by [`orientation_pointing`].
-    pub fn pointing(
-        shape: NeedleShape,
-        tip_mm: Point3<f64>,
-        direction: &Unit<Vector3<f64>>,
-    ) -> Self {
-        Self {
-            shape,
-            tip_mm,
-            orientation: orientation_pointing(direction),
-        }
+    pub fn pointing(shape: NeedleShape, tip_mm: Point3<f64>, direction: &Unit<Vector3<f64>>) -> Self {
+        Self { shape, tip_mm, orientation: orientation_pointing(direction) }
     }
 
     /// The direction in which the needle points, in scene coordinates.
@@ -79,10 +71,7 @@ impl Needle {
         for (index, &coordinate) in self.tip_mm.coords.iter().enumerate() {
             TIP_COORDINATE.check(&format!("needle.tip_mm[{index}]"), coordinate)?;
         }
-        ORIENTATION_NORM.check(
-            "needle.orientation_xyzw",
-            self.orientation.quaternion().norm(),
-        )
+        ORIENTATION_NORM.check("needle.orientation_xyzw", self.orientation.quaternion().norm())
     }
 }
 
@@ -98,10 +87,6 @@ pub fn orientation_pointing(direction: &Unit<Vector3<f64>>) -> UnitQuaternion<f6
     if z > 0.0 && lateral_squared == 0.0 {
         return UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
     }
-    let scalar = if z > 0.0 {
-        lateral_squared / (1.0 + z)
-    } else {
-        1.0 - z
-    };
+    let scalar = if z > 0.0 { lateral_squared / (1.0 + z) } else { 1.0 - z };
     UnitQuaternion::from_quaternion(Quaternion::new(scalar, y, -x, 0.0))
 }

@@ -46,29 +46,13 @@ impl Patch {
     ///
     /// On a curved surface the spacing is that of the columns' (x, y), not that along the surface.
     pub fn grid(surface: Surface, scene_from_patch: Isometry3<f64>) -> Self {
-        let coordinate =
-            |index: usize| SPACING_MM * (index as f64 - 0.5 * (NODES_PER_SIDE - 1) as f64);
+        let coordinate = |index: usize| SPACING_MM * (index as f64 - 0.5 * (NODES_PER_SIDE - 1) as f64);
         let parameters: Vec<[f64; 2]> = (0..NODE_COUNT)
-            .map(|node| {
-                [
-                    coordinate(node % NODES_PER_SIDE),
-                    coordinate(node / NODES_PER_SIDE),
-                ]
-            })
+            .map(|node| [coordinate(node % NODES_PER_SIDE), coordinate(node / NODES_PER_SIDE)])
             .collect();
-        let vertices = parameters
-            .iter()
-            .map(|&[x, y]| surface.column(x, y).surface)
-            .collect();
+        let vertices = parameters.iter().map(|&[x, y]| surface.column(x, y).surface).collect();
         let triangles = grid_triangles();
-        Self {
-            scene_from_patch,
-            surface,
-            parameters,
-            vertices,
-            triangles,
-            source_indices: None,
-        }
+        Self { scene_from_patch, surface, parameters, vertices, triangles, source_indices: None }
     }
 }
 
@@ -95,8 +79,5 @@ pub fn vertex_normals(vertices: &[Point3<f64>], triangles: &[[usize; 3]]) -> Vec
             normals[corner] += normal;
         }
     }
-    normals
-        .iter()
-        .map(|normal| normal.try_normalize(0.0).unwrap_or(Vector3::z()))
-        .collect()
+    normals.iter().map(|normal| normal.try_normalize(0.0).unwrap_or(Vector3::z())).collect()
 }

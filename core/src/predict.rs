@@ -33,9 +33,9 @@ use topologies::shared_topology;
 /// Force over the needle's cross-section, in Young's moduli of the innermost retina, beyond which tissue models of this kind do not
 /// hold: the needle punctures. Chosen where the finite-element levels still converge throughout; no puncture force of the retina is
 /// published.
-pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = 0.75;
+pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = 1.5;
 
-/// Depth under pose control beyond which no answer is given, as a share of retina and choroid together.
+/// Depth beyond which no answer is given, as a share of retina and choroid under the contact.
 pub const MAX_DEPTH_SHARE: f64 = 0.7;
 
 /// A scene with everything that depends on it alone. Shared between threads.
@@ -74,9 +74,7 @@ impl PreparedScene {
     /// Memory that the preparation holds [bytes].
     pub fn memory_bytes(&self) -> usize {
         let mesh = match &self.scene.surface {
-            SceneSurface::Mesh(mesh) => {
-                size_of_val(mesh.vertices()) + size_of_val(mesh.triangles())
-            }
+            SceneSurface::Mesh(mesh) => size_of_val(mesh.vertices()) + size_of_val(mesh.triangles()),
             _ => 0,
         };
         size_of::<Self>() + self.beds.memory_bytes() + mesh
@@ -134,11 +132,9 @@ impl PreparedScene {
                 force_mn: Some(force.norm()),
                 travel_mm: 0.0,
             },
-            Control::Pose => Motion {
-                direction: patch_from_needle.rotation * -Vector3::z_axis(),
-                force_mn: None,
-                travel_mm: 0.0,
-            },
+            Control::Pose => {
+                Motion { direction: patch_from_needle.rotation * -Vector3::z_axis(), force_mn: None, travel_mm: 0.0 }
+            }
         };
         Ok(Question { prepared: self, request, patch, tool: Tool { body, patch_from_needle }, motion })
     }
@@ -174,7 +170,7 @@ impl Question<'_> {
             return Ok(self.at_rest(decision, "no force is applied"));
         }
         let press = press(self.patch(), &self.tool, &self.motion)?;
-        self.check_range(&press.load)?;
+        self.check_pressure()?;
         let closed = !matches!(press.load, Load::Depth(depth) if depth <= 0.0);
         if !closed {
             let decision = decide(&self.request.effects, self.request.level, still)?;
@@ -188,6 +184,7 @@ impl Question<'_> {
             press,
             &self.motion.direction,
         )?;
+        self.check_depth(&linear)?;
         let strain = linear.depth_mm / self.yielding_mm();
         let decision =
             decide(&self.request.effects, self.request.level, Expected { depth_mm: linear.depth_mm, strain })?;
@@ -208,7 +205,7 @@ impl Question<'_> {
         tissue.retina_thickness_mm() + tissue.choroid.thickness_mm
     }
 
-    fn check_range(&self, load: &Load) -> Result<(), PredictError> {
+    fn check_pressure(&self) -> Result<(), PredictError> {
         if let Some(force_mn) = self.motion.force_mn {
             let radius_mm = self.tool.body.radius_mm();
             let pressure_kpa = force_mn / (std::f64::consts::PI * radius_mm * radius_mm);
@@ -219,11 +216,15 @@ impl Question<'_> {
                 return Err(PredictError::BeyondPuncture { force_mn, radius_mm, pressure_kpa, limit_kpa });
             }
         }
-        let limit_mm = MAX_DEPTH_SHARE * self.yielding_mm();
-        match *load {
-            Load::Depth(depth_mm) if depth_mm > limit_mm => Err(PredictError::TooDeep { depth_mm, limit_mm }),
-            _ => Ok(()),
-        }
+        Ok(())
+    }
+
+    fn check_depth(&self, linear: &LinearAnswer) -> Result<(), PredictError> {
+        let [x, y] = linear.press.touch.parameter;
+        let thinning_mm = self.patch().surface.column(x, y).retina_thinning_mm;
+        let limit_mm = MAX_DEPTH_SHARE * (self.yielding_mm() - thinning_mm);
+        let depth_mm = linear.depth_mm;
+        if depth_mm > limit_mm { Err(PredictError::TooDeep { depth_mm, limit_mm }) } else { Ok(()) }
     }
 
     fn linear(&self, linear: &LinearAnswer, strain: f64) -> FiniteElementAnswer {
@@ -327,11 +328,17 @@ impl Question<'_> {
         let topology = shared_topology(REFERENCE.division(&self.prepared.scene.tissue))?;
         let mut solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
         let start = self.start(linear);
+        // Travel and start belong together: a needle off by a micrometre opens the contact or closes it with a thousand kPa.
+        let aim = ContactEstimate {
+            center: coarse.estimate.center,
+            radius_mm: coarse.estimate.radius_mm,
+            ..self.estimate(linear)
+        };
         let mut answer = self.problem(decision).solve(
             Level::Reference.name(),
             &REFERENCE,
             &topology,
-            &coarse.estimate,
+            &aim,
             &start,
             &mut solver,
             progress,

@@ -50,12 +50,6 @@ impl ParameterRange {
         if (self.min..=self.max).contains(&value) {
             return Ok(());
         }
-        Err(OutOfRange {
-            field: field.to_owned(),
-            value,
-            min: self.min,
-            max: self.max,
-            unit: self.unit,
-        })
+        Err(OutOfRange { field: field.to_owned(), value, min: self.min, max: self.max, unit: self.unit })
     }
 }

@@ -69,20 +69,11 @@ impl Scene {
             "macula" => SceneSurface::Sphere { radius_mm },
             "fovea" => {
                 tissue.retina[0].thickness_mm = FOVEA_RETINA_MM;
-                SceneSurface::FovealPit {
-                    radius_mm,
-                    depth_mm: PIT_DEPTH.default,
-                    sigma_mm: PIT_SIGMA.default,
-                }
+                SceneSurface::FovealPit { radius_mm, depth_mm: PIT_DEPTH.default, sigma_mm: PIT_SIGMA.default }
             }
             _ => return None,
         };
-        Some(Self {
-            name: name.to_owned(),
-            surface,
-            tissue,
-            scene_from_patch: Isometry3::identity(),
-        })
+        Some(Self { name: name.to_owned(), surface, tissue, scene_from_patch: Isometry3::identity() })
     }
 
     /// Names of the built-in scenes: a plane, the macula as a part of the eye's ball, and the foveal pit.
@@ -95,31 +86,16 @@ impl Scene {
         self.tissue.validate()?;
         match self.surface {
             SceneSurface::Flat | SceneSurface::Mesh(_) => {}
-            SceneSurface::Sphere { radius_mm } => {
-                EYE_RADIUS.check("surface.radius_mm", radius_mm)?
-            }
-            SceneSurface::FovealPit {
-                radius_mm,
-                depth_mm,
-                sigma_mm,
-            } => {
+            SceneSurface::Sphere { radius_mm } => EYE_RADIUS.check("surface.radius_mm", radius_mm)?,
+            SceneSurface::FovealPit { radius_mm, depth_mm, sigma_mm } => {
                 EYE_RADIUS.check("surface.radius_mm", radius_mm)?;
-                let deepest = PIT_DEPTH
-                    .max
-                    .min(self.tissue.retina_thickness_mm() - LEAST_PIT_FLOOR_MM);
-                ParameterRange {
-                    max: deepest,
-                    ..PIT_DEPTH
-                }
-                .check("surface.depth_mm", depth_mm)?;
+                let deepest = PIT_DEPTH.max.min(self.tissue.retina_thickness_mm() - LEAST_PIT_FLOOR_MM);
+                ParameterRange { max: deepest, ..PIT_DEPTH }.check("surface.depth_mm", depth_mm)?;
                 PIT_SIGMA.check("surface.sigma_mm", sigma_mm)?;
             }
         }
         for (index, &coordinate) in self.scene_from_patch.translation.vector.iter().enumerate() {
-            TIP_COORDINATE.check(
-                &format!("scene_from_patch.translation_mm[{index}]"),
-                coordinate,
-            )?;
+            TIP_COORDINATE.check(&format!("scene_from_patch.translation_mm[{index}]"), coordinate)?;
         }
         let norm = self.scene_from_patch.rotation.quaternion().norm();
         ORIENTATION_NORM.check("scene_from_patch.rotation_xyzw", norm)
@@ -132,18 +108,10 @@ impl Scene {
         let surface = match &self.surface {
             SceneSurface::Mesh(mesh) => return Patch::cut(mesh, contact_in_scene),
             SceneSurface::Flat => Surface::Flat,
-            SceneSurface::Sphere { radius_mm } => Surface::Sphere {
-                radius_mm: *radius_mm,
-            },
-            SceneSurface::FovealPit {
-                radius_mm,
-                depth_mm,
-                sigma_mm,
-            } => Surface::FovealPit {
-                radius_mm: *radius_mm,
-                depth_mm: *depth_mm,
-                sigma_mm: *sigma_mm,
-            },
+            SceneSurface::Sphere { radius_mm } => Surface::Sphere { radius_mm: *radius_mm },
+            SceneSurface::FovealPit { radius_mm, depth_mm, sigma_mm } => {
+                Surface::FovealPit { radius_mm: *radius_mm, depth_mm: *depth_mm, sigma_mm: *sigma_mm }
+            }
         };
         Ok(Patch::grid(surface, self.scene_from_patch))
     }

@@ -99,12 +99,7 @@ impl PittedBall {
         let lateral_squared = x * x + y * y;
         let down = (radius_mm * radius_mm - lateral_squared).max(0.0).sqrt();
         let thinning_mm = depth_mm * (-lateral_squared / (2.0 * sigma_mm * sigma_mm)).exp();
-        Self {
-            inward: Vector3::new(x, y, -down).normalize(),
-            radius_mm,
-            sigma_mm,
-            thinning_mm,
-        }
+        Self { inward: Vector3::new(x, y, -down).normalize(), radius_mm, sigma_mm, thinning_mm }
     }
 
     fn column(&self, depth_mm: f64) -> Column {
@@ -123,8 +118,7 @@ impl PittedBall {
         let n = self.inward;
         let cos = -n.z;
         // r' = -(rho / sigma²) thinning R cos, and t = (cos n_xy / sin, sin); their product needs no division by sin.
-        let slope = -self.radius_mm * self.radius_mm * cos * self.thinning_mm
-            / (self.sigma_mm * self.sigma_mm);
+        let slope = -self.radius_mm * self.radius_mm * cos * self.thinning_mm / (self.sigma_mm * self.sigma_mm);
         let sin_squared = n.x * n.x + n.y * n.y;
         let along = Vector3::new(cos * n.x, cos * n.y, sin_squared) * slope;
         Unit::new_normalize(along - n * (self.radius_mm + self.thinning_mm))
@@ -138,11 +132,9 @@ impl Surface {
         match self {
             Self::Flat => straight(Point3::new(x, y, 0.0)),
             Self::Sphere { radius_mm } => PittedBall::at(x, y, *radius_mm, 0.0, 1.0).column(0.0),
-            Self::FovealPit {
-                radius_mm,
-                depth_mm,
-                sigma_mm,
-            } => PittedBall::at(x, y, *radius_mm, *depth_mm, *sigma_mm).column(*depth_mm),
+            Self::FovealPit { radius_mm, depth_mm, sigma_mm } => {
+                PittedBall::at(x, y, *radius_mm, *depth_mm, *sigma_mm).column(*depth_mm)
+            }
             Self::Mesh(field) => straight(Point3::new(x, y, field.height(x, y))),
         }
     }
@@ -154,11 +146,9 @@ impl Surface {
         match self {
             Self::Flat => Vector3::z_axis(),
             Self::Sphere { radius_mm } => PittedBall::at(x, y, *radius_mm, 0.0, 1.0).normal(),
-            Self::FovealPit {
-                radius_mm,
-                depth_mm,
-                sigma_mm,
-            } => PittedBall::at(x, y, *radius_mm, *depth_mm, *sigma_mm).normal(),
+            Self::FovealPit { radius_mm, depth_mm, sigma_mm } => {
+                PittedBall::at(x, y, *radius_mm, *depth_mm, *sigma_mm).normal()
+            }
             Self::Mesh(field) => {
                 let h = DIFFERENCE_MM;
                 let slope_x = (field.height(x + h, y) - field.height(x - h, y)) / (2.0 * h);
@@ -170,9 +160,5 @@ impl Surface {
 }
 
 fn straight(surface: Point3<f64>) -> Column {
-    Column {
-        surface,
-        inward: -Vector3::z_axis(),
-        retina_thinning_mm: 0.0,
-    }
+    Column { surface, inward: -Vector3::z_axis(), retina_thinning_mm: 0.0 }
 }

@@ -40,15 +40,9 @@ impl Layer {
     }
 
     fn validate(&self, path: &str, allowed: &LayerRanges) -> Result<(), OutOfRange> {
-        let check = |range: &ParameterRange, name: &str, value| {
-            range.check(&format!("{path}.{name}"), value)
-        };
+        let check = |range: &ParameterRange, name: &str, value| range.check(&format!("{path}.{name}"), value);
         check(&allowed.thickness, "thickness_mm", self.thickness_mm)?;
-        check(
-            &allowed.youngs_modulus,
-            "youngs_modulus_kpa",
-            self.youngs_modulus_kpa,
-        )?;
+        check(&allowed.youngs_modulus, "youngs_modulus_kpa", self.youngs_modulus_kpa)?;
         check(&allowed.poisson_ratio, "poisson_ratio", self.poisson_ratio)
     }
 }
@@ -119,10 +113,7 @@ impl Default for Tissue {
 impl Tissue {
     /// The default wall with the inner limiting membrane on it.
     pub fn with_inner_limiting_membrane() -> Self {
-        Self {
-            inner_limiting_membrane: Some(ranges::INNER_LIMITING_MEMBRANE.default_layer()),
-            ..Self::default()
-        }
+        Self { inner_limiting_membrane: Some(ranges::INNER_LIMITING_MEMBRANE.default_layer()), ..Self::default() }
     }
 
     /// The default wall with the retina as five sublayers of equal thickness and [`RABBIT_SUBLAYER_MODULI_KPA`].
@@ -131,37 +122,16 @@ impl Tissue {
     pub fn rabbit_sublayers() -> Self {
         let whole = ranges::RETINA.default_layer();
         let thickness_mm = whole.thickness_mm / RABBIT_SUBLAYER_MODULI_KPA.len() as f64;
-        let sublayer = |youngs_modulus_kpa| Layer {
-            thickness_mm,
-            youngs_modulus_kpa,
-            ..whole
-        };
-        Self {
-            retina: RABBIT_SUBLAYER_MODULI_KPA.map(sublayer).to_vec(),
-            ..Self::default()
-        }
+        let sublayer = |youngs_modulus_kpa| Layer { thickness_mm, youngs_modulus_kpa, ..whole };
+        Self { retina: RABBIT_SUBLAYER_MODULI_KPA.map(sublayer).to_vec(), ..Self::default() }
     }
 
     /// All layers from the vitreous outwards.
     pub fn layers(&self) -> Vec<NamedLayer> {
-        let membrane = self
-            .inner_limiting_membrane
-            .map(|layer| (LayerKind::InnerLimitingMembrane, layer));
-        let retina = self
-            .retina
-            .iter()
-            .enumerate()
-            .map(|(index, layer)| (LayerKind::Retina(index), *layer));
-        let backing = [
-            (LayerKind::Choroid, self.choroid),
-            (LayerKind::Sclera, self.sclera),
-        ];
-        membrane
-            .into_iter()
-            .chain(retina)
-            .chain(backing)
-            .map(|(kind, layer)| NamedLayer { kind, layer })
-            .collect()
+        let membrane = self.inner_limiting_membrane.map(|layer| (LayerKind::InnerLimitingMembrane, layer));
+        let retina = self.retina.iter().enumerate().map(|(index, layer)| (LayerKind::Retina(index), *layer));
+        let backing = [(LayerKind::Choroid, self.choroid), (LayerKind::Sclera, self.sclera)];
+        membrane.into_iter().chain(retina).chain(backing).map(|(kind, layer)| NamedLayer { kind, layer }).collect()
     }
 
     /// Thickness of the retina, all sublayers together and without the inner limiting membrane, mm.
@@ -183,8 +153,6 @@ impl Tissue {
             };
             layer.validate(&kind.path(), allowed)?;
         }
-        ranges::RETINA
-            .thickness
-            .check("tissue.retina.thickness_mm", self.retina_thickness_mm())
+        ranges::RETINA.thickness.check("tissue.retina.thickness_mm", self.retina_thickness_mm())
     }
 }

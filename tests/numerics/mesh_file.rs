@@ -20,33 +20,19 @@ fn ply(text: &str) -> Result<TriangleMesh, MeshFileError> {
 
 /// The PLY sample as binary, with doubles.
 fn binary_ply(big_endian: bool) -> Vec<u8> {
-    let encoding = if big_endian {
-        "binary_big_endian"
-    } else {
-        "binary_little_endian"
-    };
+    let encoding = if big_endian { "binary_big_endian" } else { "binary_little_endian" };
     let mut bytes = format!(
         "ply\nformat {encoding} 1.0\nelement vertex 5\nproperty double x\nproperty double y\nproperty double z\n\
          element edge 1\nproperty ushort a\nelement face 2\nproperty list uchar uint vertex_index\nend_header\n"
     )
     .into_bytes();
     let double = |value: f64| {
-        if big_endian {
-            value.to_be_bytes()
-        } else {
-            value.to_le_bytes()
-        }
+        if big_endian { value.to_be_bytes() } else { value.to_le_bytes() }
     };
     let uint = |value: u32| {
-        if big_endian {
-            value.to_be_bytes()
-        } else {
-            value.to_le_bytes()
-        }
+        if big_endian { value.to_be_bytes() } else { value.to_le_bytes() }
     };
-    for value in [
-        0., 0., 0.125, 1., 0., 0., 1., 1., 0., 0., 1., 0., 2., 0.5, 1e-9,
-    ] {
+    for value in [0., 0., 0.125, 1., 0., 0., 1., 1., 0., 0., 1., 0., 2., 0.5, 1e-9] {
         bytes.extend(double(value));
     }
     bytes.extend([1, 2]);
@@ -62,17 +48,10 @@ fn every_encoding_gives_the_same_mesh() {
     let mesh = obj(OBJ).unwrap();
     assert_eq!(mesh.triangles(), [[0, 1, 2], [0, 2, 3], [1, 4, 2]]);
     assert_eq!(mesh.vertices()[0].z, 0.125);
-    assert_eq!(
-        mesh.vertices()[4].z,
-        1e-9,
-        "coordinates keep the digits of f64"
-    );
+    assert_eq!(mesh.vertices()[4].z, 1e-9, "coordinates keep the digits of f64");
     assert_eq!(ply(PLY).unwrap(), mesh);
     for big_endian in [false, true] {
-        assert_eq!(
-            read_mesh(&binary_ply(big_endian), MeshFormat::Ply).unwrap(),
-            mesh
-        );
+        assert_eq!(read_mesh(&binary_ply(big_endian), MeshFormat::Ply).unwrap(), mesh);
     }
 }
 
@@ -86,11 +65,7 @@ fn truncated_files_are_errors_and_never_panics() {
     ] {
         for length in 0..bytes.len() {
             let result = read_mesh(&bytes[..length], format);
-            assert!(
-                result.is_err() || length > bytes.len() - tail,
-                "{format:?} {length} of {}",
-                bytes.len()
-            );
+            assert!(result.is_err() || length > bytes.len() - tail, "{format:?} {length} of {}", bytes.len());
         }
     }
 }
@@ -99,15 +74,9 @@ fn truncated_files_are_errors_and_never_panics() {
 fn garbage_is_an_error() {
     let mut state = 1u64;
     for round in 0..300 {
-        let mut bytes = if round % 3 == 0 {
-            vec![0; 200]
-        } else {
-            binary_ply(round % 3 == 1)
-        };
+        let mut bytes = if round % 3 == 0 { vec![0; 200] } else { binary_ply(round % 3 == 1) };
         for _ in 0..=(round / 10) {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             let place = (state >> 33) as usize % bytes.len();
             bytes[place] = (state >> 24) as u8;
         }
@@ -118,124 +87,61 @@ fn garbage_is_an_error() {
             }
         }
     }
-    assert!(matches!(
-        obj("v 0 0\n"),
-        Err(MeshFileError::Malformed { .. })
-    ));
+    assert!(matches!(obj("v 0 0\n"), Err(MeshFileError::Malformed { .. })));
     assert_eq!(obj(""), Err(MeshFileError::Empty));
-    assert!(matches!(
-        ply("nonsense"),
-        Err(MeshFileError::Malformed { .. })
-    ));
-    assert!(matches!(
-        read_mesh(&[0xff, 0xfe], MeshFormat::Obj),
-        Err(MeshFileError::Malformed { .. })
-    ));
+    assert!(matches!(ply("nonsense"), Err(MeshFileError::Malformed { .. })));
+    assert!(matches!(read_mesh(&[0xff, 0xfe], MeshFormat::Obj), Err(MeshFileError::Malformed { .. })));
 }
 
 #[test]
 fn numbers_that_are_none_are_refused_with_their_vertex() {
     let error = obj(&OBJ.replace("v 1 0 0\n", "v 1 NaN 0\n")).unwrap_err();
-    assert!(
-        matches!(
-            error,
-            MeshFileError::Mesh(MeshError::Vertex { vertex: 1, .. })
-        ),
-        "{error}"
-    );
+    assert!(matches!(error, MeshFileError::Mesh(MeshError::Vertex { vertex: 1, .. })), "{error}");
     // Text PLY has no word for infinity; the bits of one stand in for the x of vertex 2 in the binary sample.
-    assert!(matches!(
-        ply(&PLY.replace("1 1 0 9", "1 inf 0 9")),
-        Err(MeshFileError::Malformed { .. })
-    ));
+    assert!(matches!(ply(&PLY.replace("1 1 0 9", "1 inf 0 9")), Err(MeshFileError::Malformed { .. })));
     let mut bytes = binary_ply(false);
-    let header = bytes
-        .windows(11)
-        .position(|window| window == b"end_header\n")
-        .unwrap()
-        + 11;
+    let header = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
     bytes[header + 48..header + 56].copy_from_slice(&f64::INFINITY.to_le_bytes());
     let error = read_mesh(&bytes, MeshFormat::Ply).unwrap_err();
-    assert!(
-        matches!(
-            error,
-            MeshFileError::Mesh(MeshError::Vertex { vertex: 2, .. })
-        ),
-        "{error}"
-    );
+    assert!(matches!(error, MeshFileError::Mesh(MeshError::Vertex { vertex: 2, .. })), "{error}");
 }
 
 #[test]
 fn indices_out_of_range_are_refused() {
-    for face in [
-        "f 1 2 6",
-        "f 1 2 0",
-        "f 1 2 -6",
-        "f 1 2 -9223372036854775808",
-        "f 1 2 99999999999999999999",
-        "f 1 2",
-    ] {
+    for face in ["f 1 2 6", "f 1 2 0", "f 1 2 -6", "f 1 2 -9223372036854775808", "f 1 2 99999999999999999999", "f 1 2"]
+    {
         let error = obj(&OBJ.replace("f 2//1 -1//1 3//1", face)).unwrap_err();
         let at_line_or_triangle = matches!(&error, MeshFileError::Malformed { reason, .. } if reason.contains("line 13"))
-            || matches!(
-                error,
-                MeshFileError::Mesh(MeshError::IndexOutOfRange { triangle: 2, .. })
-            );
+            || matches!(error, MeshFileError::Mesh(MeshError::IndexOutOfRange { triangle: 2, .. }));
         assert!(at_line_or_triangle, "{face}: {error}");
     }
     let error = ply(&PLY.replace("3 1 4 2", "3 1 5 2")).unwrap_err();
-    assert!(
-        matches!(
-            error,
-            MeshFileError::Mesh(MeshError::IndexOutOfRange {
-                triangle: 2,
-                vertex: 5,
-                ..
-            })
-        ),
-        "{error}"
-    );
-    assert!(matches!(
-        ply(&PLY.replace("3 1 4 2", "3 1 -1 2")),
-        Err(MeshFileError::Malformed { .. })
-    ));
+    assert!(matches!(error, MeshFileError::Mesh(MeshError::IndexOutOfRange { triangle: 2, vertex: 5, .. })), "{error}");
+    assert!(matches!(ply(&PLY.replace("3 1 4 2", "3 1 -1 2")), Err(MeshFileError::Malformed { .. })));
 }
 
 #[test]
 fn announced_counts_cost_nothing() {
     for count in ["18446744073709551615", "4000000000", "2000000"] {
-        for text in [
-            PLY.replace("vertex 5", &format!("vertex {count}")),
-            PLY.replace("face 2", &format!("face {count}")),
-        ] {
+        for text in
+            [PLY.replace("vertex 5", &format!("vertex {count}")), PLY.replace("face 2", &format!("face {count}"))]
+        {
             let error = ply(&text).unwrap_err();
             assert!(
-                matches!(
-                    error,
-                    MeshFileError::TooLarge { .. } | MeshFileError::Malformed { .. }
-                ),
+                matches!(error, MeshFileError::TooLarge { .. } | MeshFileError::Malformed { .. }),
                 "{count}: {error}"
             );
         }
     }
     let error = ply(&PLY.replace("vertex 5", "vertex 2000001")).unwrap_err();
-    assert_eq!(
-        error,
-        MeshFileError::TooLarge {
-            what: "vertices",
-            count: 2_000_001,
-            limit: VERTEX_LIMIT
-        }
-    );
+    assert_eq!(error, MeshFileError::TooLarge { what: "vertices", count: 2_000_001, limit: VERTEX_LIMIT });
     // A list that announces four thousand million corners, in a file that ends there.
-    let mut bytes = "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uint uint vertex_index\nend_header\n"
-        .as_bytes()
-        .to_vec();
+    let mut bytes =
+        "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uint uint vertex_index\nend_header\n"
+            .as_bytes()
+            .to_vec();
     bytes.extend(u32::MAX.to_le_bytes());
-    assert!(matches!(
-        read_mesh(&bytes, MeshFormat::Ply),
-        Err(MeshFileError::Malformed { .. })
-    ));
+    assert!(matches!(read_mesh(&bytes, MeshFormat::Ply), Err(MeshFileError::Malformed { .. })));
     // Elements without properties would be read for ever from no bytes at all.
     let empty = "ply\nformat binary_little_endian 1.0\nelement nothing 4000000\nend_header\n";
     assert!(matches!(ply(empty), Err(MeshFileError::Malformed { .. })));
@@ -243,19 +149,8 @@ fn announced_counts_cost_nothing() {
 
 #[test]
 fn split_vertices_are_merged_and_faces_without_area_dropped() {
-    let mesh =
-        obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nv 0 1 -0\nf 1 2 3\nf 4 5 6\nf 2 4 5\n")
-            .unwrap();
-    assert_eq!(
-        (mesh.vertices().len(), mesh.triangles()),
-        (4, &[[0, 1, 2], [1, 3, 2]][..])
-    );
+    let mesh = obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nv 0 1 -0\nf 1 2 3\nf 4 5 6\nf 2 4 5\n").unwrap();
+    assert_eq!((mesh.vertices().len(), mesh.triangles()), (4, &[[0, 1, 2], [1, 3, 2]][..]));
     let error = obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4\n").unwrap_err();
-    assert!(
-        matches!(
-            error,
-            MeshFileError::Mesh(MeshError::InconsistentOrientation { .. })
-        ),
-        "{error}"
-    );
+    assert!(matches!(error, MeshFileError::Mesh(MeshError::InconsistentOrientation { .. })), "{error}");
 }

@@ -21,8 +21,7 @@ pub fn hilly(x: f64, y: f64) -> f64 {
 /// `n` × `n` vertices `spacing` mm apart around the origin, shaken a little, on [`hilly`] ground.
 pub fn hills(n: usize, spacing: f64) -> (Vec<Point3<f64>>, Vec<[usize; 3]>) {
     let mut random = noise(17);
-    let place =
-        |index: usize, shake: f64| spacing * (index as f64 - 0.5 * (n - 1) as f64 + 0.2 * shake);
+    let place = |index: usize, shake: f64| spacing * (index as f64 - 0.5 * (n - 1) as f64 + 0.2 * shake);
     let vertices = (0..n * n)
         .map(|i| {
             let (x, y) = (place(i % n, random()), place(i / n, random()));
@@ -35,8 +34,5 @@ pub fn hills(n: usize, spacing: f64) -> (Vec<Point3<f64>>, Vec<[usize; 3]>) {
 /// Two triangles for each square of `n` × `n` vertices, counter-clockwise seen from +z.
 pub fn grid_triangles(n: usize) -> Vec<[usize; 3]> {
     let square = |i: usize| i % n + 1 < n && i / n + 1 < n;
-    (0..n * n)
-        .filter(|&i| square(i))
-        .flat_map(|i| [[i, i + 1, i + n + 1], [i, i + n + 1, i + n]])
-        .collect()
+    (0..n * n).filter(|&i| square(i)).flat_map(|i| [[i, i + 1, i + n + 1], [i, i + n + 1, i + n]]).collect()
 }

@@ -8,20 +8,12 @@ use crate::meshes::noise;
 fn shapes(radius: f64) -> Vec<NeedleShape> {
     let bevel = |angle_deg, edge| NeedleShape {
         radius_mm: radius,
-        tip: Tip::Bevelled {
-            angle_deg,
-            edge_radius_mm: edge * radius,
-        },
+        tip: Tip::Bevelled { angle_deg, edge_radius_mm: edge * radius },
     };
     vec![
         NeedleShape::hemispherical(radius),
         NeedleShape::flat(radius),
-        NeedleShape {
-            radius_mm: radius,
-            tip: Tip::Flat {
-                edge_radius_mm: 0.6 * radius,
-            },
-        },
+        NeedleShape { radius_mm: radius, tip: Tip::Flat { edge_radius_mm: 0.6 * radius } },
         NeedleShape::bevelled(radius),
         bevel(15.0, 0.05),
         bevel(75.0, 0.5),
@@ -34,9 +26,7 @@ fn smooth_around(body: &Body, p: &Point3<f64>, h: f64) -> bool {
     let here = body.signed_distance(p).hessian;
     let step = |axis| Vector3::ith_axis(axis).into_inner() * h;
     let around = (0..3).flat_map(|axis| [p - step(axis), p + step(axis)]);
-    around
-        .into_iter()
-        .all(|q| (body.signed_distance(&q).hessian - here).amax() <= 1e-2 * here.amax())
+    around.into_iter().all(|q| (body.signed_distance(&q).hessian - here).amax() <= 1e-2 * here.amax())
 }
 
 #[test]
@@ -48,12 +38,7 @@ fn derivatives_match_differences_at_every_scale() {
             let (mut checked, mut curved) = (0, 0);
             for _ in 0..400 {
                 let p = Point3::new(
-                    1.6 * radius * random()
-                        + if shape.tip == Tip::Hemispherical {
-                            0.0
-                        } else {
-                            -0.3 * radius
-                        },
+                    1.6 * radius * random() + if shape.tip == Tip::Hemispherical { 0.0 } else { -0.3 * radius },
                     1.6 * radius * random(),
                     radius * (1.2 + 2.0 * random()),
                 );
@@ -73,28 +58,14 @@ fn derivatives_match_differences_at_every_scale() {
                     gradient[axis] = (high.value - low.value) / (2.0 * h);
                     hessian.set_column(axis, &((high.gradient - low.gradient) / (2.0 * h)));
                 }
-                assert!(
-                    at.gradient.norm() > 0.1,
-                    "a gradient of zero proves nothing: {shape:?} {p}"
-                );
-                assert!(
-                    (at.gradient - gradient).amax() < 1e-7,
-                    "{shape:?} {p} {} {gradient}",
-                    at.gradient
-                );
+                assert!(at.gradient.norm() > 0.1, "a gradient of zero proves nothing: {shape:?} {p}");
+                assert!((at.gradient - gradient).amax() < 1e-7, "{shape:?} {p} {} {gradient}", at.gradient);
                 let size = at.hessian.amax().max(1.0 / radius);
-                assert!(
-                    (at.hessian - hessian).amax() < 1e-5 * size,
-                    "{shape:?} {p} {} {hessian}",
-                    at.hessian
-                );
+                assert!((at.hessian - hessian).amax() < 1e-5 * size, "{shape:?} {p} {} {hessian}", at.hessian);
                 checked += 1;
                 curved += usize::from(at.hessian.amax() > 1e-3 / radius);
             }
-            assert!(
-                checked > 200 && curved > 50,
-                "{shape:?}: {checked} points, {curved} of them curved"
-            );
+            assert!(checked > 200 && curved > 50, "{shape:?}: {checked} points, {curved} of them curved");
         }
     }
 }
@@ -105,14 +76,8 @@ fn derivatives_are_finite_on_the_axis_and_at_the_tip() {
         for z in [-0.5, -0.1, 0.0, 0.025, 0.125, 0.25, 0.5, 2.0] {
             for p in [Point3::new(0.0, 0.0, z), Point3::new(-0.225, 0.0, z)] {
                 let at = shape.signed_distance(&p);
-                assert!(
-                    at.value.is_finite() && at.gradient.norm() < 1.5,
-                    "{shape:?} {p}"
-                );
-                assert!(
-                    at.hessian.iter().all(|entry| entry.is_finite()),
-                    "{shape:?} {p}"
-                );
+                assert!(at.value.is_finite() && at.gradient.norm() < 1.5, "{shape:?} {p}");
+                assert!(at.hessian.iter().all(|entry| entry.is_finite()), "{shape:?} {p}");
             }
         }
     }
@@ -135,41 +100,22 @@ fn revolved_surface(shape: &NeedleShape, n: usize) -> Vec<Point3<f64>> {
         profile.push((radius, edge + 4.0 * radius * t));
     }
     let around = (0..n).map(|i| (i as f64 * std::f64::consts::TAU / n as f64).sin_cos());
-    around
-        .flat_map(|(sin, cos)| {
-            profile
-                .iter()
-                .map(move |&(r, z)| Point3::new(r * cos, r * sin, z))
-        })
-        .collect()
+    around.flat_map(|(sin, cos)| profile.iter().map(move |&(r, z)| Point3::new(r * cos, r * sin, z))).collect()
 }
 
 #[test]
 fn distance_is_that_to_the_nearest_point_of_the_surface() {
     let radius = 0.25;
-    for shape in shapes(radius)
-        .into_iter()
-        .filter(|shape| !matches!(shape.tip, Tip::Bevelled { .. }))
-    {
+    for shape in shapes(radius).into_iter().filter(|shape| !matches!(shape.tip, Tip::Bevelled { .. })) {
         let surface = revolved_surface(&shape, 300);
         let mut random = noise(3);
         let (mut inside, mut outside) = (0, 0);
         for _ in 0..40 {
-            let p = Point3::new(
-                2.0 * radius * random(),
-                2.0 * radius * random(),
-                radius * (0.5 + 1.5 * random()),
-            );
-            let nearest = surface
-                .iter()
-                .map(|q| (p - q).norm())
-                .fold(f64::INFINITY, f64::min);
+            let p = Point3::new(2.0 * radius * random(), 2.0 * radius * random(), radius * (0.5 + 1.5 * random()));
+            let nearest = surface.iter().map(|q| (p - q).norm()).fold(f64::INFINITY, f64::min);
             let value = shape.distance(&p);
             // The samples are at most 0.0053 mm apart, so the nearest is off by no more than that, and by less further away.
-            assert!(
-                (value.abs() - nearest).abs() < 1e-3,
-                "{shape:?} {p} {value} {nearest}"
-            );
+            assert!((value.abs() - nearest).abs() < 1e-3, "{shape:?} {p} {value} {nearest}");
             let is_inside = p.x.hypot(p.y) < radius && p.z > 0.0 && value < 0.0;
             inside += usize::from(is_inside);
             outside += usize::from(value > 0.0);
@@ -186,16 +132,10 @@ fn the_foremost_point_of_the_solid_is_the_origin() {
         let foremost = body.foremost_along(&-Vector3::z_axis()).unwrap();
         assert!(foremost.coords.norm() < 1e-12, "{shape:?} {foremost}");
         // Nothing of the solid lies below z = 0, and something lies just above it.
-        let grid = (-100..=100)
-            .flat_map(|i| (-100..=100).map(move |j| (0.008 * i as f64, 0.008 * j as f64)));
-        let deepest = grid
-            .map(|(x, y)| body.distance(&Point3::new(x, y, -1e-9)))
-            .fold(f64::INFINITY, f64::min);
+        let grid = (-100..=100).flat_map(|i| (-100..=100).map(move |j| (0.008 * i as f64, 0.008 * j as f64)));
+        let deepest = grid.map(|(x, y)| body.distance(&Point3::new(x, y, -1e-9))).fold(f64::INFINITY, f64::min);
         assert!(deepest > 0.0, "{shape:?} {deepest}");
-        assert!(
-            body.distance(&Point3::new(-1e-7, 0.0, 1e-5)) < 0.0,
-            "{shape:?}"
-        );
+        assert!(body.distance(&Point3::new(-1e-7, 0.0, 1e-5)) < 0.0, "{shape:?}");
     }
 }
 
@@ -205,16 +145,12 @@ fn foremost_points_touch_the_surface_and_nothing_lies_beyond() {
     for shape in shapes(0.257) {
         let body = shape.body();
         for _ in 0..50 {
-            let inward =
-                Unit::new_normalize(Vector3::new(random(), random(), -0.05 - random().abs()));
+            let inward = Unit::new_normalize(Vector3::new(random(), random(), -0.05 - random().abs()));
             let foremost = body.foremost_along(&inward).unwrap();
             let at = body.signed_distance(&foremost);
             assert!(at.value.abs() < 1e-12, "{shape:?} {inward:?} {}", at.value);
             // The body is convex: where its outward normal is the direction, nothing lies further along it.
-            assert!(
-                (at.gradient.normalize() - inward.into_inner()).norm() < 1e-6,
-                "{shape:?} {inward:?}"
-            );
+            assert!((at.gradient.normalize() - inward.into_inner()).norm() < 1e-6, "{shape:?} {inward:?}");
         }
         assert_eq!(body.foremost_along(&Vector3::z_axis()), None);
         assert_eq!(body.foremost_along(&Vector3::x_axis()), None);
@@ -225,17 +161,11 @@ fn foremost_points_touch_the_surface_and_nothing_lies_beyond() {
 fn plain_height(body: &Body, origin: &Point3<f64>, up: &Vector3<f64>) -> Option<f64> {
     let distance = |height: f64| body.distance(&(origin + up * height));
     let step = 1e-4;
-    let above = (0..10_000)
-        .map(|i| i as f64 * step)
-        .find(|&height| distance(height) <= 0.0)?;
+    let above = (0..10_000).map(|i| i as f64 * step).find(|&height| distance(height) <= 0.0)?;
     let (mut low, mut high) = ((above - step).max(0.0), above);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if distance(middle) <= 0.0 {
-            high = middle
-        } else {
-            low = middle
-        }
+        if distance(middle) <= 0.0 { high = middle } else { low = middle }
     }
     Some(high)
 }
@@ -252,11 +182,7 @@ fn underside_agrees_with_plain_marching() {
             let profile = body.underside_profile(&inward, &lowest, &radii).unwrap();
             let up = -inward.into_inner();
             let leaning = Vector3::z() - up * up.z;
-            let across = if leaning.norm() < 1e-12 {
-                Vector3::x()
-            } else {
-                leaning.normalize()
-            };
+            let across = if leaning.norm() < 1e-12 { Vector3::x() } else { leaning.normalize() };
             for (&radius, &height) in radii.iter().zip(&profile) {
                 let hits: Vec<f64> = (0..16)
                     .filter_map(|i| {
@@ -266,16 +192,10 @@ fn underside_agrees_with_plain_marching() {
                     })
                     .collect();
                 if hits.len() < 8 {
-                    assert!(
-                        height.is_infinite(),
-                        "{shape:?} {inward:?} {radius} {height}"
-                    );
+                    assert!(height.is_infinite(), "{shape:?} {inward:?} {radius} {height}");
                 } else {
                     let expected = hits.iter().sum::<f64>() / hits.len() as f64;
-                    assert!(
-                        (height - expected).abs() < 1e-6,
-                        "{shape:?} {inward:?} {radius} {height} {expected}"
-                    );
+                    assert!((height - expected).abs() < 1e-6, "{shape:?} {inward:?} {radius} {height} {expected}");
                     finite += 1;
                 }
             }
@@ -292,125 +212,62 @@ fn underside_of_a_ball_and_of_a_flat_tip_have_closed_forms() {
         let inward = Unit::new_normalize(Vector3::from(inward));
         let lowest = ball.foremost_along(&inward).unwrap();
         let profile = ball.underside_profile(&inward, &lowest, &radii).unwrap();
-        for (radius, height) in radii
-            .iter()
-            .zip(&profile)
-            .filter(|(radius, _)| **radius < 0.24)
-        {
+        for (radius, height) in radii.iter().zip(&profile).filter(|(radius, _)| **radius < 0.24) {
             let expected = 0.25 - (0.0625 - radius * radius).sqrt();
-            assert!(
-                (height - expected).abs() < 1e-6,
-                "{inward:?} {radius} {height} {expected}"
-            );
+            assert!((height - expected).abs() < 1e-6, "{inward:?} {radius} {height} {expected}");
         }
         assert!(profile[29].is_infinite());
     }
     let flat = NeedleShape::flat(0.25).body();
     let down = -Vector3::z_axis();
-    let profile = flat
-        .underside_profile(&down, &Point3::origin(), &[0.0, 0.2, 0.24, 0.26])
-        .unwrap();
-    assert_eq!(
-        (profile[0], profile[1], profile[3]),
-        (0.0, 0.0, f64::INFINITY)
-    );
+    let profile = flat.underside_profile(&down, &Point3::origin(), &[0.0, 0.2, 0.24, 0.26]).unwrap();
+    assert_eq!((profile[0], profile[1], profile[3]), (0.0, 0.0, f64::INFINITY));
     assert!((profile[2] - (0.025 - (0.025f64.powi(2) - 0.015f64.powi(2)).sqrt())).abs() < 1e-9);
-    assert_eq!(
-        flat.underside_profile(&Vector3::z_axis(), &Point3::origin(), &radii),
-        None
-    );
+    assert_eq!(flat.underside_profile(&Vector3::z_axis(), &Point3::origin(), &radii), None);
 }
 
 #[test]
 fn a_needle_points_along_the_direction_asked_for() {
     let mut random = noise(5);
-    let mut directions = vec![
-        Vector3::z(),
-        -Vector3::z(),
-        Vector3::new(1e-9, 0.0, 1.0),
-        Vector3::new(0.0, -1e-200, 1.0),
-    ];
+    let mut directions =
+        vec![Vector3::z(), -Vector3::z(), Vector3::new(1e-9, 0.0, 1.0), Vector3::new(0.0, -1e-200, 1.0)];
     directions.extend((0..50).map(|_| Vector3::new(random(), random(), random())));
     for direction in directions.into_iter().map(Unit::new_normalize) {
-        let needle = Needle::pointing(
-            NeedleShape::flat(0.25),
-            Point3::new(1.0, 2.0, 3.0),
-            &direction,
-        );
-        assert!(
-            (needle.direction().into_inner() - direction.into_inner()).norm() < 1e-12,
-            "{direction:?}"
-        );
+        let needle = Needle::pointing(NeedleShape::flat(0.25), Point3::new(1.0, 2.0, 3.0), &direction);
+        assert!((needle.direction().into_inner() - direction.into_inner()).norm() < 1e-12, "{direction:?}");
         needle.validate().unwrap();
         // The shortest rotation: no longer than the angle between the two directions.
         let angle = (-Vector3::z()).angle(&direction);
-        assert!(
-            (needle.orientation.angle() - angle).abs() < 1e-7,
-            "{direction:?}"
-        );
+        assert!((needle.orientation.angle() - angle).abs() < 1e-7, "{direction:?}");
     }
     assert!(orientation_pointing(&-Vector3::z_axis()).angle() < 1e-15);
     let turned = orientation_pointing(&Vector3::z_axis());
-    assert!(
-        (turned * Vector3::x() - Vector3::x()).norm() < 1e-15,
-        "the half turn is about local x"
-    );
+    assert!((turned * Vector3::x() - Vector3::x()).norm() < 1e-15, "the half turn is about local x");
 }
 
 #[test]
 fn a_needle_outside_its_ranges_is_refused_with_the_field() {
     let refused = |shape: NeedleShape| shape.validate().unwrap_err().field;
     assert_eq!(refused(NeedleShape::flat(0.6)), "needle.radius_mm");
-    assert_eq!(
-        refused(NeedleShape::hemispherical(f64::NAN)),
-        "needle.radius_mm"
-    );
-    let tip = Tip::Flat {
-        edge_radius_mm: 0.21,
-    };
-    assert_eq!(
-        refused(NeedleShape {
-            radius_mm: 0.2,
-            tip
-        }),
-        "needle.tip.edge_radius_mm"
-    );
-    let tip = Tip::Bevelled {
-        angle_deg: 80.0,
-        edge_radius_mm: 0.02,
-    };
-    assert_eq!(
-        refused(NeedleShape {
-            radius_mm: 0.2,
-            tip
-        }),
-        "needle.tip.angle_deg"
-    );
+    assert_eq!(refused(NeedleShape::hemispherical(f64::NAN)), "needle.radius_mm");
+    let tip = Tip::Flat { edge_radius_mm: 0.21 };
+    assert_eq!(refused(NeedleShape { radius_mm: 0.2, tip }), "needle.tip.edge_radius_mm");
+    let tip = Tip::Bevelled { angle_deg: 80.0, edge_radius_mm: 0.02 };
+    assert_eq!(refused(NeedleShape { radius_mm: 0.2, tip }), "needle.tip.angle_deg");
     for shape in shapes(0.257) {
         shape.validate().unwrap();
     }
-    let mut needle = Needle::pointing(
-        NeedleShape::flat(0.25),
-        Point3::origin(),
-        &Vector3::x_axis(),
-    );
+    let mut needle = Needle::pointing(NeedleShape::flat(0.25), Point3::origin(), &Vector3::x_axis());
     needle.tip_mm.y = f64::NAN;
     assert_eq!(needle.validate().unwrap_err().field, "needle.tip_mm[1]");
     needle.tip_mm.y = 0.0;
-    needle.orientation =
-        UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 0.0));
-    assert_eq!(
-        needle.validate().unwrap_err().field,
-        "needle.orientation_xyzw"
-    );
+    needle.orientation = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 0.0));
+    assert_eq!(needle.validate().unwrap_err().field, "needle.orientation_xyzw");
 }
 
 #[test]
 fn gauges_have_names() {
     assert_eq!(Gauge::from_name("25G").unwrap().radius_mm(), 0.257);
     let error = Gauge::from_name("26G").unwrap_err();
-    assert!(
-        error.to_string().contains("41G, 38G, 30G, 27G, 25G, 23G"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("41G, 38G, 30G, 27G, 25G, 23G"), "{error}");
 }

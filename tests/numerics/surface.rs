@@ -5,11 +5,7 @@ use retina_core::surface::{HeightField, MeshError, Surface, TriangleMesh};
 
 use crate::meshes::{grid_triangles, hills, hilly, noise};
 
-const PIT: Surface = Surface::FovealPit {
-    radius_mm: 12.0,
-    depth_mm: 0.13,
-    sigma_mm: 0.25,
-};
+const PIT: Surface = Surface::FovealPit { radius_mm: 12.0, depth_mm: 0.13, sigma_mm: 0.25 };
 
 fn field(n: usize, spacing: f64) -> Surface {
     let (vertices, triangles) = hills(n, spacing);
@@ -20,11 +16,7 @@ fn field(n: usize, spacing: f64) -> Surface {
 fn every_surface_passes_through_the_origin_or_its_height() {
     for surface in [Surface::Flat, Surface::Sphere { radius_mm: 12.0 }, PIT] {
         let column = surface.column(0.0, 0.0);
-        assert!(
-            column.surface.coords.norm() < 1e-12,
-            "{surface:?} {}",
-            column.surface
-        );
+        assert!(column.surface.coords.norm() < 1e-12, "{surface:?} {}", column.surface);
         assert!((column.inward.into_inner() + Vector3::z()).norm() < 1e-15);
         assert!((surface.normal(0.0, 0.0).into_inner() - Vector3::z()).norm() < 1e-15);
     }
@@ -42,13 +34,7 @@ fn the_ball_is_seen_from_inside() {
         assert!((column.inward.into_inner() - (column.surface - centre) / 12.0).norm() < 1e-12);
         assert!((ball.normal(x, y).into_inner() + column.inward.into_inner()).norm() < 1e-12);
     }
-    assert!(
-        ball.column(20.0, 0.0)
-            .surface
-            .coords
-            .iter()
-            .all(|coordinate| coordinate.is_finite())
-    );
+    assert!(ball.column(20.0, 0.0).surface.coords.iter().all(|coordinate| coordinate.is_finite()));
 }
 
 #[test]
@@ -58,8 +44,7 @@ fn the_pit_thins_the_retina_and_leaves_the_layers_below_on_a_ball() {
     for (x, y) in [(0.0, 0.0), (0.25, 0.0), (0.3, -0.4), (1.05, 1.05)] {
         let column = PIT.column(x, y);
         // The outer face of a 0.23 mm retina lies on one ball, whatever the pit takes away above it.
-        let outer =
-            column.surface + column.inward.into_inner() * (0.23 - column.retina_thinning_mm);
+        let outer = column.surface + column.inward.into_inner() * (0.23 - column.retina_thinning_mm);
         assert!(((outer - centre).norm() - 12.23).abs() < 1e-12, "{x} {y}");
         let expected = 0.13 * (-(x * x + y * y) / 0.125f64).exp();
         assert!((column.retina_thinning_mm - expected).abs() < 1e-15);
@@ -70,25 +55,13 @@ fn the_pit_thins_the_retina_and_leaves_the_layers_below_on_a_ball() {
 fn normals_stand_on_the_tangents() {
     let mut tilted = 0;
     for surface in [Surface::Sphere { radius_mm: 12.0 }, PIT] {
-        for (x, y) in [
-            (0.0, 0.0),
-            (0.1, 0.0),
-            (0.2, -0.15),
-            (-0.4, 0.3),
-            (1.0, 1.0),
-            (5.0, -2.0),
-        ] {
+        for (x, y) in [(0.0, 0.0), (0.1, 0.0), (0.2, -0.15), (-0.4, 0.3), (1.0, 1.0), (5.0, -2.0)] {
             let normal = surface.normal(x, y);
             let h = 1e-5;
-            let tangent_x =
-                (surface.column(x + h, y).surface - surface.column(x - h, y).surface) / (2.0 * h);
-            let tangent_y =
-                (surface.column(x, y + h).surface - surface.column(x, y - h).surface) / (2.0 * h);
+            let tangent_x = (surface.column(x + h, y).surface - surface.column(x - h, y).surface) / (2.0 * h);
+            let tangent_y = (surface.column(x, y + h).surface - surface.column(x, y - h).surface) / (2.0 * h);
             let expected = tangent_x.cross(&tangent_y).normalize();
-            assert!(
-                (normal.into_inner() - expected).norm() < 1e-8,
-                "{surface:?} {x} {y} {normal:?} {expected}"
-            );
+            assert!((normal.into_inner() - expected).norm() < 1e-8, "{surface:?} {x} {y} {normal:?} {expected}");
             tilted += usize::from(expected.z < 0.99);
         }
     }
@@ -111,41 +84,21 @@ fn a_height_field_is_linear_inside_triangles_and_close_to_what_it_samples() {
         let (x, y) = (2.0 * random(), 2.0 * random());
         let column = surface.column(x, y);
         assert!((column.surface.z - hilly(x, y)).abs() < 3e-3, "{x} {y}");
-        assert_eq!(
-            (column.inward.into_inner(), column.retina_thinning_mm),
-            (-Vector3::z(), 0.0)
-        );
+        assert_eq!((column.inward.into_inner(), column.retina_thinning_mm), (-Vector3::z(), 0.0));
         let h = 1e-4;
-        let slopes = (
-            (hilly(x + h, y) - hilly(x - h, y)) / (2.0 * h),
-            (hilly(x, y + h) - hilly(x, y - h)) / (2.0 * h),
-        );
+        let slopes = ((hilly(x + h, y) - hilly(x - h, y)) / (2.0 * h), (hilly(x, y + h) - hilly(x, y - h)) / (2.0 * h));
         let expected = Vector3::new(-slopes.0, -slopes.1, 1.0).normalize();
-        assert!(
-            (surface.normal(x, y).into_inner() - expected).norm() < 0.03,
-            "{x} {y}"
-        );
+        assert!((surface.normal(x, y).into_inner() - expected).norm() < 0.03, "{x} {y}");
     }
 }
 
 #[test]
 fn a_height_field_goes_on_level_beyond_its_rim() {
-    let vertices = [[0.0, 0.0, 1.0], [1.0, 0.0, 2.0], [0.0, 1.0, 3.0]]
-        .map(Point3::from)
-        .to_vec();
+    let vertices = [[0.0, 0.0, 1.0], [1.0, 0.0, 2.0], [0.0, 1.0, 3.0]].map(Point3::from).to_vec();
     let heights = HeightField::new(vertices, vec![[0, 1, 2]]).unwrap();
-    for (x, y, expected) in [
-        (-5.0, -5.0, 1.0),
-        (9.0, 0.0, 2.0),
-        (0.25, -3.0, 1.25),
-        (1.0, 1.0, 2.5),
-        (-1.0, 0.5, 2.0),
-    ] {
-        assert!(
-            (heights.height(x, y) - expected).abs() < 1e-12,
-            "{x} {y} {}",
-            heights.height(x, y)
-        );
+    for (x, y, expected) in [(-5.0, -5.0, 1.0), (9.0, 0.0, 2.0), (0.25, -3.0, 1.25), (1.0, 1.0, 2.5), (-1.0, 0.5, 2.0)]
+    {
+        assert!((heights.height(x, y) - expected).abs() < 1e-12, "{x} {y} {}", heights.height(x, y));
     }
     assert!(field(12, 0.3).column(1e6, -1e6).surface.z.is_finite());
 }
@@ -183,33 +136,11 @@ fn unsound_meshes_are_refused_with_what_is_wrong() {
         change(&mut vertices, &mut triangles);
         TriangleMesh::new(vertices, triangles).unwrap_err()
     };
-    assert!(matches!(
-        refused(|v, _| v[3].y = f64::NAN),
-        MeshError::Vertex { vertex: 3, .. }
-    ));
-    assert!(matches!(
-        refused(|v, _| v[2].z = 1e9),
-        MeshError::Vertex { vertex: 2, .. }
-    ));
-    assert_eq!(
-        refused(|v, _| v[5] = v[1]),
-        MeshError::DuplicateVertex {
-            first: 1,
-            second: 5
-        }
-    );
-    assert_eq!(
-        refused(|_, t| t[4][2] = 16),
-        MeshError::IndexOutOfRange {
-            triangle: 4,
-            vertex: 16,
-            vertex_count: 16
-        }
-    );
-    assert_eq!(
-        refused(|_, t| t[7] = [1, 1, 2]),
-        MeshError::NoArea { triangle: 7 }
-    );
+    assert!(matches!(refused(|v, _| v[3].y = f64::NAN), MeshError::Vertex { vertex: 3, .. }));
+    assert!(matches!(refused(|v, _| v[2].z = 1e9), MeshError::Vertex { vertex: 2, .. }));
+    assert_eq!(refused(|v, _| v[5] = v[1]), MeshError::DuplicateVertex { first: 1, second: 5 });
+    assert_eq!(refused(|_, t| t[4][2] = 16), MeshError::IndexOutOfRange { triangle: 4, vertex: 16, vertex_count: 16 });
+    assert_eq!(refused(|_, t| t[7] = [1, 1, 2]), MeshError::NoArea { triangle: 7 });
     assert_eq!(
         refused(|v, t| {
             v.push(v[0] + (v[1] - v[0]) * 0.5);
@@ -217,10 +148,7 @@ fn unsound_meshes_are_refused_with_what_is_wrong() {
         }),
         MeshError::NoArea { triangle: 18 }
     );
-    assert!(matches!(
-        refused(|_, t| t[3].swap(0, 1)),
-        MeshError::InconsistentOrientation { .. }
-    ));
+    assert!(matches!(refused(|_, t| t[3].swap(0, 1)), MeshError::InconsistentOrientation { .. }));
 }
 
 #[test]

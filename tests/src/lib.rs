@@ -1,1 +1,4 @@
-//! Tests.
+//! What the test tiers and the measuring programs share. Sees every package, is seen by none.
+
+pub mod statistics;
+pub mod working_range;

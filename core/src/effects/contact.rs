@@ -13,7 +13,7 @@
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 
 use crate::effect::{Effect, Local, Stencils};
-use crate::mesh::element::{FACE_NODES, gauss_rule, TOP_NODES, shapes};
+use crate::mesh::element::{FACE_NODES, TOP_NODES, gauss_rule, shapes};
 use crate::needle::Body;
 
 /// Name of the effect.

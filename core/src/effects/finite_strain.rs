@@ -199,13 +199,7 @@ impl FiniteStrain<'_> {
 
     /// The part −2/3 µ J^(−2/3) (fₐᵢ g_bⱼ + gₐᵢ f_bⱼ), f = F G, that only the isochoric energy has.
     #[inline(always)]
-    fn add_mixed(
-        &self,
-        local: &Local,
-        points: &Points,
-        spatial: &[NodeRows; POINTS],
-        out: &mut [f64],
-    ) {
+    fn add_mixed(&self, local: &Local, points: &Points, spatial: &[NodeRows; POINTS], out: &mut [f64]) {
         let mu = self.materials[local.group].mu;
         let rows = out.as_chunks_mut::<NODES>().0;
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
@@ -252,8 +246,7 @@ impl FiniteStrain<'_> {
             let f = self.geometry.deformation_gradient(local.group, q, local.current);
             let df = self.geometry.deformation_gradient(local.group, q, step);
             let (j, _) = determinant_and_cofactor(&f);
-            while largest > f64::EPSILON
-                && determinant_and_cofactor(&(f + df * largest)).0 <= SMALLEST_VOLUME_RATIO * j
+            while largest > f64::EPSILON && determinant_and_cofactor(&(f + df * largest)).0 <= SMALLEST_VOLUME_RATIO * j
             {
                 largest *= 0.7;
             }
@@ -275,7 +268,8 @@ fn determinant_and_cofactor(f: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
 fn push_forward(matrix: &Matrix3<f64>, gradients: &NodeRows, out: &mut NodeRows) {
     for i in 0..3 {
         for a in 0..NODES {
-            out[i][a] = matrix[(i, 0)] * gradients[0][a] + matrix[(i, 1)] * gradients[1][a] + matrix[(i, 2)] * gradients[2][a];
+            out[i][a] =
+                matrix[(i, 0)] * gradients[0][a] + matrix[(i, 1)] * gradients[1][a] + matrix[(i, 2)] * gradients[2][a];
         }
     }
 }

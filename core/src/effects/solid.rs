@@ -23,7 +23,9 @@ const BLOCKS: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2,
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SolidGeometryError {
     /// The rest Jacobian is not positive at a quadrature point.
-    #[error("element {element} is inverted or degenerate at rest (Jacobian {jacobian:e} mm³ at quadrature point {point})")]
+    #[error(
+        "element {element} is inverted or degenerate at rest (Jacobian {jacobian:e} mm³ at quadrature point {point})"
+    )]
     Inverted {
         /// Element index.
         element: usize,

@@ -37,11 +37,7 @@ pub fn force_beyond(r: f64, t0: f64, t1: f64, f0: f64, f1: f64) -> f64 {
     let low = t0.max(r);
     let root0 = cut_root(low, r);
     let root1 = cut_root(t1, r);
-    let log = if r > 0.0 {
-        ((t1 + root1) / (low + root0)).ln()
-    } else {
-        0.0
-    };
+    let log = if r > 0.0 { ((t1 + root1) / (low + root0)).ln() } else { 0.0 };
     let square = 0.5 * (t1 * root1 - low * root0 + r * r * log);
     (f0 - slope * t0) * (root1 - root0) + slope * square
 }

@@ -65,49 +65,24 @@ impl LayeredBed {
             return Err(LayeredError::NoLayers);
         }
         for (index, layer) in self.layers.iter().enumerate() {
-            let refuse = |field, value, allowed| {
-                Err(LayeredError::InvalidLayer {
-                    index,
-                    field,
-                    value,
-                    allowed,
-                })
-            };
+            let refuse = |field, value, allowed| Err(LayeredError::InvalidLayer { index, field, value, allowed });
             if !(layer.thickness_mm.is_finite() && layer.thickness_mm > 0.0) {
                 return refuse("thickness_mm", layer.thickness_mm, "finite, > 0");
             }
             if !(layer.youngs_modulus_kpa.is_finite() && layer.youngs_modulus_kpa > 0.0) {
-                return refuse(
-                    "youngs_modulus_kpa",
-                    layer.youngs_modulus_kpa,
-                    "finite, > 0",
-                );
+                return refuse("youngs_modulus_kpa", layer.youngs_modulus_kpa, "finite, > 0");
             }
             if !(layer.poisson_ratio > -1.0 && layer.poisson_ratio < 0.5) {
                 return refuse("poisson_ratio", layer.poisson_ratio, "-1 < nu < 0.5");
             }
         }
-        if let BedBase::Springs {
-            normal_kpa_per_mm,
-            tangential_kpa_per_mm,
-        } = self.base
-        {
-            let refuse = |field, value, allowed| {
-                Err(LayeredError::InvalidBase {
-                    field,
-                    value,
-                    allowed,
-                })
-            };
+        if let BedBase::Springs { normal_kpa_per_mm, tangential_kpa_per_mm } = self.base {
+            let refuse = |field, value, allowed| Err(LayeredError::InvalidBase { field, value, allowed });
             if !(normal_kpa_per_mm.is_finite() && normal_kpa_per_mm > 0.0) {
                 return refuse("normal_kpa_per_mm", normal_kpa_per_mm, "finite, > 0");
             }
             if !(tangential_kpa_per_mm.is_finite() && tangential_kpa_per_mm >= 0.0) {
-                return refuse(
-                    "tangential_kpa_per_mm",
-                    tangential_kpa_per_mm,
-                    "finite, >= 0",
-                );
+                return refuse("tangential_kpa_per_mm", tangential_kpa_per_mm, "finite, >= 0");
             }
         }
         Ok(())

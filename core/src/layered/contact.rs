@@ -30,26 +30,15 @@ impl LinearBed {
     ///
     /// # Errors
     /// A negative or non-finite force, a bad profile, or a contact wider than the largest sample radius.
-    pub fn indent_by_force(
-        &self,
-        profile: &RigidProfile,
-        normal_force_mn: f64,
-    ) -> Result<Indentation, LayeredError> {
-        self.indent(
-            profile,
-            Target::Force(checked("normal_force_mn", normal_force_mn)?),
-        )
+    pub fn indent_by_force(&self, profile: &RigidProfile, normal_force_mn: f64) -> Result<Indentation, LayeredError> {
+        self.indent(profile, Target::Force(checked("normal_force_mn", normal_force_mn)?))
     }
 
     /// Presses the tool to a depth, mm, measured from first touch.
     ///
     /// # Errors
     /// A negative or non-finite depth, a bad profile, or a contact wider than the largest sample radius.
-    pub fn indent_by_depth(
-        &self,
-        profile: &RigidProfile,
-        depth_mm: f64,
-    ) -> Result<Indentation, LayeredError> {
+    pub fn indent_by_depth(&self, profile: &RigidProfile, depth_mm: f64) -> Result<Indentation, LayeredError> {
         self.indent(profile, Target::Depth(checked("depth_mm", depth_mm)?))
     }
 
@@ -91,22 +80,14 @@ impl LinearBed {
         }
         let samples = if stops.ends_at_edge { last } else { last + 1 };
         let closing = &self.stretches[front].closing[..samples];
-        gaps[..samples]
-            .iter_mut()
-            .zip(closing)
-            .skip(front + 1)
-            .for_each(|(gap, rate)| *gap -= stretch.force * rate);
+        gaps[..samples].iter_mut().zip(closing).skip(front + 1).for_each(|(gap, rate)| *gap -= stretch.force * rate);
     }
 
     /// Ends the march inside a stretch, where the target is met.
     fn finish(&self, result: &mut Indentation, stretch: &Stretch, target: Target) {
         let [start, end] = stretch.radii;
         let radius_at = |force: f64| {
-            let part = if stretch.force.is_infinite() {
-                1.0
-            } else {
-                force / stretch.force
-            };
+            let part = if stretch.force.is_infinite() { 1.0 } else { force / stretch.force };
             // Force grows about as the cube of the radius: exactly so for a paraboloid on a half-space.
             let cube = start.powi(3) + part * (end.powi(3) - start.powi(3));
             cube.cbrt()
@@ -116,20 +97,13 @@ impl LinearBed {
                 return 0.0;
             }
             let punches = stretch_punches(start, radius_at(force));
-            let depth: f64 = punches
-                .iter()
-                .map(|&(radius, part)| part * self.blend(radius).depth)
-                .sum();
+            let depth: f64 = punches.iter().map(|&(radius, part)| part * self.blend(radius).depth).sum();
             force * depth
         };
         let force = match target {
             Target::Force(force) => force - result.normal_force_mn,
-            Target::Depth(depth) if stretch.force.is_infinite() => {
-                (depth - result.depth_mm) / stretch.depth
-            }
-            Target::Depth(depth) => {
-                increasing_root(depth_of, depth - result.depth_mm, stretch.force)
-            }
+            Target::Depth(depth) if stretch.force.is_infinite() => (depth - result.depth_mm) / stretch.depth,
+            Target::Depth(depth) => increasing_root(depth_of, depth - result.depth_mm, stretch.force),
         };
         match target {
             Target::Force(total) => {
@@ -142,12 +116,7 @@ impl LinearBed {
             }
         }
         result.contact_radius_mm = radius_at(force);
-        push_punches(
-            &mut result.partial_punches,
-            start,
-            result.contact_radius_mm,
-            force,
-        );
+        push_punches(&mut result.partial_punches, start, result.contact_radius_mm, force);
     }
 }
 
@@ -156,12 +125,7 @@ fn commit(result: &mut Indentation, stops: &Stops, stretch: &Stretch, front: usi
     result.normal_force_mn += stretch.force;
     result.depth_mm += stretch.force * stretch.depth;
     if stops.ends_at_edge && front + 2 == stops.radii.len() {
-        push_punches(
-            &mut result.partial_punches,
-            stretch.radii[0],
-            stretch.radii[1],
-            stretch.force,
-        );
+        push_punches(&mut result.partial_punches, stretch.radii[0], stretch.radii[1], stretch.force);
     } else {
         result.stretch_forces_mn.resize(front + 1, 0.0);
         result.stretch_forces_mn[front] = stretch.force;
@@ -191,9 +155,5 @@ fn increasing_root(f: impl Fn(f64) -> f64, target: f64, end: f64) -> f64 {
 
 /// A load that is finite and not negative.
 fn checked(field: &'static str, value: f64) -> Result<f64, LayeredError> {
-    if value.is_finite() && value >= 0.0 {
-        Ok(value)
-    } else {
-        Err(LayeredError::InvalidLoad { field, value })
-    }
+    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(LayeredError::InvalidLoad { field, value }) }
 }

@@ -57,9 +57,7 @@ pub enum LayeredError {
         value: f64,
     },
     /// The contact grows past the largest prepared radius.
-    #[error(
-        "the contact grows past the largest prepared radius, {radius_mm} mm, at a force of {force_mn} mN"
-    )]
+    #[error("the contact grows past the largest prepared radius, {radius_mm} mm, at a force of {force_mn} mN")]
     ContactTooWide {
         /// The largest prepared contact radius, mm.
         radius_mm: f64,

@@ -48,23 +48,13 @@ impl RadialGrid {
             nodes_mm.push(high);
             (low, step) = (high, step + 1.0);
         }
-        let samples_mm = (0..=nodes_mm.len() / 3)
-            .map(|sample| nodes_mm[Self::sample_node(sample)])
-            .collect();
-        Self {
-            nodes_mm,
-            samples_mm,
-            log_ratio,
-        }
+        let samples_mm = (0..=nodes_mm.len() / 3).map(|sample| nodes_mm[Self::sample_node(sample)]).collect();
+        Self { nodes_mm, samples_mm, log_ratio }
     }
 
     /// Node of punch `punch`.
     pub fn punch_node(punch: usize) -> usize {
-        if punch == 0 {
-            1
-        } else {
-            3 + 3 * ((punch - 1) / 2) + (punch - 1) % 2
-        }
+        if punch == 0 { 1 } else { 3 + 3 * ((punch - 1) / 2) + (punch - 1) % 2 }
     }
 
     /// Node of profile sample `sample`; sample 0 is the axis, stretch i runs from sample i to i + 1.
@@ -74,11 +64,7 @@ impl RadialGrid {
 
     /// Indices of the punches of stretch `stretch`.
     pub fn punches_of(stretch: usize) -> std::ops::Range<usize> {
-        if stretch == 0 {
-            0..1
-        } else {
-            2 * stretch - 1..2 * stretch + 1
-        }
+        if stretch == 0 { 0..1 } else { 2 * stretch - 1..2 * stretch + 1 }
     }
 
     /// Radius of punch `punch`, mm.
@@ -97,8 +83,7 @@ impl RadialGrid {
         if r_mm < samples[1] {
             return 0;
         }
-        let index =
-            (1 + ((r_mm / samples[1]).ln() / self.log_ratio) as usize).min(samples.len() - 2);
+        let index = (1 + ((r_mm / samples[1]).ln() / self.log_ratio) as usize).min(samples.len() - 2);
         // The logarithm may round across a sample.
         if r_mm < samples[index] {
             index - 1
@@ -125,8 +110,7 @@ pub fn stretch_punches(start: f64, end: f64) -> [(f64, f64); 2] {
     if start <= 0.0 {
         return [(POINT_FRACTION * end, 1.0), (POINT_FRACTION * end, 0.0)];
     }
-    let [low, high] =
-        [0.5 - PAIR_OFFSET, 0.5 + PAIR_OFFSET].map(|part| start + part * (end - start));
+    let [low, high] = [0.5 - PAIR_OFFSET, 0.5 + PAIR_OFFSET].map(|part| start + part * (end - start));
     let sum = low * low + high * high;
     [(low, low * low / sum), (high, high * high / sum)]
 }

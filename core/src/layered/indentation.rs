@@ -37,39 +37,22 @@ impl LinearBed {
         let samples = self.sample_radii_mm();
         let mut forces = vec![0.0; samples.len() - 1];
         let mut add = |ring_forces: &[f64], force: f64| {
-            forces
-                .iter_mut()
-                .zip(ring_forces)
-                .for_each(|(sum, ring)| *sum += force * ring);
+            forces.iter_mut().zip(ring_forces).for_each(|(sum, ring)| *sum += force * ring);
         };
-        self.stretches
-            .iter()
-            .zip(&indentation.stretch_forces_mn)
-            .for_each(|(table, &q)| add(&table.ring_forces, q));
+        self.stretches.iter().zip(&indentation.stretch_forces_mn).for_each(|(table, &q)| add(&table.ring_forces, q));
         for partial in &indentation.partial_punches {
             for (punch, weight) in self.blend(partial.radius_mm).weights() {
                 add(&self.punches[punch].ring_forces, weight * partial.force_mn);
             }
         }
         let area = |ring: &[f64]| PI * (ring[1] - ring[0]) * (ring[1] + ring[0]);
-        forces
-            .iter()
-            .zip(samples.windows(2))
-            .map(|(force, ring)| force / area(ring))
-            .collect()
+        forces.iter().zip(samples.windows(2)).map(|(force, ring)| force / area(ring)).collect()
     }
 }
 
 /// Adds the loaded ones of the punches that stand for growth from `start` to `end` under `force`; one punch if they are equal.
 pub(super) fn push_punches(punches: &mut Vec<PartialPunch>, start: f64, end: f64, force: f64) {
-    let parts = if start == end {
-        [(end, 1.0), (end, 0.0)]
-    } else {
-        stretch_punches(start, end)
-    };
-    let loaded = parts.into_iter().map(|(radius_mm, part)| PartialPunch {
-        radius_mm,
-        force_mn: part * force,
-    });
+    let parts = if start == end { [(end, 1.0), (end, 0.0)] } else { stretch_punches(start, end) };
+    let loaded = parts.into_iter().map(|(radius_mm, part)| PartialPunch { radius_mm, force_mn: part * force });
     punches.extend(loaded.filter(|punch| punch.force_mn > 0.0));
 }

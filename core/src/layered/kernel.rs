@@ -43,10 +43,7 @@ pub fn surface_compliance(bed: &LayeredBed, k: C64) -> Compliance<C64> {
     }
     let (state, shear) = below.expect("a valid bed has a layer");
     let traction = Matrix2::new(state[(2, 0)], state[(2, 1)], state[(3, 0)], state[(3, 1)]);
-    let amplitudes = solve2(
-        &traction,
-        Vector2::new(C64::new(0.0, 0.0), C64::new(-0.5 / shear, 0.0)),
-    );
+    let amplitudes = solve2(&traction, Vector2::new(C64::new(0.0, 0.0), C64::new(-0.5 / shear, 0.0)));
     Compliance {
         normal: state[(1, 0)] * amplitudes[0] + state[(1, 1)] * amplitudes[1],
         radial: state[(0, 0)] * amplitudes[0] + state[(0, 1)] * amplitudes[1],
@@ -56,10 +53,7 @@ pub fn surface_compliance(bed: &LayeredBed, k: C64) -> Compliance<C64> {
 /// [`surface_compliance`] at a real wave number `k_per_mm` > 0.
 pub fn surface_compliance_real(bed: &LayeredBed, k_per_mm: f64) -> Compliance<f64> {
     let compliance = surface_compliance(bed, C64::new(k_per_mm, 0.0));
-    Compliance {
-        normal: compliance.normal.re,
-        radial: compliance.radial.re,
-    }
+    Compliance { normal: compliance.normal.re, radial: compliance.radial.re }
 }
 
 /// The two states (U, V, s_ry, s_yy) that the base admits at the lower face of `layer`.
@@ -70,10 +64,7 @@ fn base_states(base: &BedBase, layer: &BedLayer, k: C64) -> Matrix4x2<C64> {
             states[(2, 0)] = C64::new(1.0, 0.0);
             states[(3, 1)] = C64::new(1.0, 0.0);
         }
-        BedBase::Springs {
-            normal_kpa_per_mm,
-            tangential_kpa_per_mm,
-        } => {
+        BedBase::Springs { normal_kpa_per_mm, tangential_kpa_per_mm } => {
             let unit = 2.0 * layer.shear_modulus_kpa() * k;
             states[(0, 0)] = C64::new(1.0, 0.0);
             states[(2, 0)] = -tangential_kpa_per_mm / unit;
@@ -91,14 +82,8 @@ fn top_states(layer: &BedLayer, support: &Matrix4x2<C64>, k: C64) -> Matrix4x2<C
     let mut system = Matrix4::zeros();
     system.fixed_columns_mut::<2>(0).copy_from(&up);
     for column in 0..2 {
-        let scale = support
-            .column(column)
-            .iter()
-            .fold(0.0_f64, |m, value| m.max(value.norm()));
-        system.set_column(
-            column + 2,
-            &(support.column(column) / C64::new(-scale, 0.0)),
-        );
+        let scale = support.column(column).iter().fold(0.0_f64, |m, value| m.max(value.norm()));
+        system.set_column(column + 2, &(support.column(column) / C64::new(-scale, 0.0)));
     }
     let solution = system.lu().solve(&(-down)).unwrap_or_else(Matrix4x2::zeros);
     let reflection = solution.fixed_rows::<2>(0).into_owned();

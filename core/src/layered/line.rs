@@ -66,11 +66,7 @@ pub fn line_kernels(bed: &LayeredBed, end_mm: f64) -> (LineKernel, LineKernel) {
     let mut normal = Vec::with_capacity(points);
     let mut radial = Vec::with_capacity(points);
     for point in 0..points {
-        let s = if point == 0 {
-            0.0
-        } else {
-            FIRST_S_MM * f64::exp(TABLE_LOG_STEP * (point as f64 - 1.0))
-        };
+        let s = if point == 0 { 0.0 } else { FIRST_S_MM * f64::exp(TABLE_LOG_STEP * (point as f64 - 1.0)) };
         let (mut even, mut odd) = (Sample::default(), Sample::default());
         for &(k, normal_weight, radial_weight) in &weighted {
             let [wave, first, second] = wave_integrals(C64::new(0.0, s) * k);
@@ -87,11 +83,7 @@ pub fn line_kernels(bed: &LayeredBed, end_mm: f64) -> (LineKernel, LineKernel) {
         normal.push(even);
         radial.push(odd);
     }
-    let kernel = |samples, parity| LineKernel {
-        samples,
-        parity,
-        smooth_mm: top.thickness_mm,
-    };
+    let kernel = |samples, parity| LineKernel { samples, parity, smooth_mm: top.thickness_mm };
     (kernel(normal, 1.0), kernel(radial, -1.0))
 }
 
@@ -152,6 +144,5 @@ impl LineKernel {
 /// Cubic Hermite interpolation on an interval of length `step`.
 fn hermite(x: f64, step: f64, value0: f64, slope0: f64, value1: f64, slope1: f64) -> f64 {
     let y = 1.0 - x;
-    y * y * ((1.0 + 2.0 * x) * value0 + x * step * slope0)
-        + x * x * ((1.0 + 2.0 * y) * value1 - y * step * slope1)
+    y * y * ((1.0 + 2.0 * x) * value0 + x * step * slope0) + x * x * ((1.0 + 2.0 * y) * value1 - y * step * slope1)
 }

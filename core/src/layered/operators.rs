@@ -46,15 +46,8 @@ impl ElementWeights {
     pub fn apply(&self, point: usize, first: usize, values: &[f64]) -> f64 {
         let rows = self.left.nrows();
         let column = point * rows + first..(point + 1) * rows;
-        let (left, right) = (
-            &self.left.as_slice()[column.clone()],
-            &self.right.as_slice()[column],
-        );
-        left.iter()
-            .zip(right)
-            .zip(values.windows(2))
-            .map(|((l, r), value)| l * value[0] + r * value[1])
-            .sum()
+        let (left, right) = (&self.left.as_slice()[column.clone()], &self.right.as_slice()[column]);
+        left.iter().zip(right).zip(values.windows(2)).map(|((l, r), value)| l * value[0] + r * value[1]).sum()
     }
 }
 
@@ -80,9 +73,8 @@ impl Operators {
         let nodes = &grid.nodes_mm;
         let elements = RadialGrid::punch_node(PUNCHES - 1);
         let (normal, radial) = line_kernels(bed, grid.end_mm() + nodes[elements]);
-        let gauss: Vec<f64> = (0..elements)
-            .flat_map(|e| GAUSS_4.map(|(x, _)| nodes[e] + x * (nodes[e + 1] - nodes[e])))
-            .collect();
+        let gauss: Vec<f64> =
+            (0..elements).flat_map(|e| GAUSS_4.map(|(x, _)| nodes[e] + x * (nodes[e + 1] - nodes[e]))).collect();
         let kernel = |kernel: &LineKernel, points: &[f64]| {
             ElementWeights::new(points.len(), elements, |point, e| {
                 cosine_moments(kernel, points[point], nodes[e], nodes[e + 1])
@@ -94,10 +86,7 @@ impl Operators {
                 if (inner && x0 >= r) || (!inner && x1 <= r) {
                     (0.0, 0.0)
                 } else {
-                    (
-                        transform(r, x0, x1, 1.0, 0.0),
-                        transform(r, x0, x1, 0.0, 1.0),
-                    )
+                    (transform(r, x0, x1, 1.0, 0.0), transform(r, x0, x1, 0.0, 1.0))
                 }
             })
         };
@@ -124,18 +113,12 @@ fn cosine_moments(kernel: &LineKernel, x: f64, t0: f64, t1: f64) -> (f64, f64) {
 fn linear_moments(kernel: &LineKernel, x: f64, sigma: f64, t0: f64, t1: f64) -> (f64, f64) {
     let width = t1 - t0;
     let (s0, s1) = (x + sigma * t0, x + sigma * t1);
-    let distance = if s0 * s1 <= 0.0 {
-        0.0
-    } else {
-        s0.abs().min(s1.abs())
-    };
+    let distance = if s0 * s1 <= 0.0 { 0.0 } else { s0.abs().min(s1.abs()) };
     if width <= SMOOTH_PART * kernel.smooth_mm.max(distance) {
-        return GAUSS_4
-            .iter()
-            .fold((0.0, 0.0), |(left, right), &(at, weight)| {
-                let value = weight * width * kernel.value(x + sigma * (t0 + at * width));
-                (left + (1.0 - at) * value, right + at * value)
-            });
+        return GAUSS_4.iter().fold((0.0, 0.0), |(left, right), &(at, weight)| {
+            let value = weight * width * kernel.value(x + sigma * (t0 + at * width));
+            (left + (1.0 - at) * value, right + at * value)
+        });
     }
     let (first0, second0) = kernel.integrals(s0);
     let (first1, second1) = kernel.integrals(s1);

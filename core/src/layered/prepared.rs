@@ -39,10 +39,7 @@ pub(super) struct PunchBlend {
 impl PunchBlend {
     /// The prepared punches blended and their weights.
     pub fn weights(&self) -> [(usize, f64); 2] {
-        [
-            (self.lower, 1.0 - self.weight),
-            (self.lower + 1, self.weight),
-        ]
+        [(self.lower, 1.0 - self.weight), (self.lower + 1, self.weight)]
     }
 }
 
@@ -66,11 +63,7 @@ impl LinearBed {
             .enumerate()
             .map(|(index, punch)| PunchTable::new(grid.punch_radius_mm(index), &punch, &grid))
             .collect();
-        Ok(Self {
-            grid,
-            punches,
-            stretches,
-        })
+        Ok(Self { grid, punches, stretches })
     }
 
     /// Radii at which a tool's profile is sampled, mm, ascending from 0.
@@ -90,9 +83,7 @@ impl LinearBed {
 
     /// The punch of radius `radius_mm` > 0.
     pub(super) fn blend(&self, radius_mm: f64) -> PunchBlend {
-        let after = self
-            .punches
-            .partition_point(|table| table.radius <= radius_mm);
+        let after = self.punches.partition_point(|table| table.radius <= radius_mm);
         let (lower, weight) = if after == 0 {
             (0, 0.0)
         } else if after == self.punches.len() {
@@ -107,14 +98,7 @@ impl LinearBed {
         let edge_normal = mix(&|table| table.radius * table.edge_normal) / radius_mm;
         let edge_radial = mix(&|table| table.radius * table.edge_radial) / radius_mm;
         let depth = edge_normal + mix(&|table| table.depth - table.edge_normal);
-        PunchBlend {
-            radius: radius_mm,
-            lower,
-            weight,
-            edge_normal,
-            edge_radial,
-            depth,
-        }
+        PunchBlend { radius: radius_mm, lower, weight, edge_normal, edge_radial, depth }
     }
 
     /// By how much 1 mN on the punch shrinks the gap at `r_mm`, mm/mN, at least zero.
@@ -122,9 +106,8 @@ impl LinearBed {
         let at = self.grid.node_interval(r_mm);
         let (r0, r1) = (self.grid.nodes_mm[at], self.grid.nodes_mm[at + 1]);
         let fraction = (r_mm - r0) / (r1 - r0);
-        let smooth = |table: &PunchTable| {
-            (1.0 - fraction) * table.smooth_nodes[at] + fraction * table.smooth_nodes[at + 1]
-        };
+        let smooth =
+            |table: &PunchTable| (1.0 - fraction) * table.smooth_nodes[at] + fraction * table.smooth_nodes[at + 1];
         let smooth = (1.0 - punch.weight) * smooth(&self.punches[punch.lower])
             + punch.weight * smooth(&self.punches[punch.lower + 1]);
         (punch.depth + smooth - punch.edge_normal * edge_shape_normal(punch.radius, r_mm)).max(0.0)

@@ -42,18 +42,9 @@ impl RigidProfile<'_> {
     pub(super) fn stops(&self, bed: &LinearBed) -> Result<Stops, LayeredError> {
         let samples = bed.sample_radii_mm();
         if self.heights_mm.len() != samples.len() {
-            return Err(LayeredError::ProfileLength {
-                given: self.heights_mm.len(),
-                expected: samples.len(),
-            });
+            return Err(LayeredError::ProfileLength { given: self.heights_mm.len(), expected: samples.len() });
         }
-        let refuse = |field, radius_mm, value| {
-            Err(LayeredError::InvalidProfile {
-                field,
-                radius_mm,
-                value,
-            })
-        };
+        let refuse = |field, radius_mm, value| Err(LayeredError::InvalidProfile { field, radius_mm, value });
         for (&radius, &height) in samples.iter().zip(self.heights_mm) {
             if height.is_nan() || height == f64::NEG_INFINITY {
                 return refuse("height_mm", radius, height);
@@ -66,8 +57,7 @@ impl RigidProfile<'_> {
         let mut radii = samples.to_vec();
         let mut heights = self.heights_mm.to_vec();
         if let Some(edge) = edge {
-            let within =
-                edge.radius_mm >= samples[1] && edge.radius_mm <= samples[samples.len() - 1];
+            let within = edge.radius_mm >= samples[1] && edge.radius_mm <= samples[samples.len() - 1];
             if !within {
                 return refuse("edge radius_mm", edge.radius_mm, edge.radius_mm);
             }
@@ -85,29 +75,15 @@ impl RigidProfile<'_> {
             return refuse("every height_mm", 0.0, lowest);
         }
         heights.iter_mut().for_each(|height| *height -= lowest);
-        let first = heights
-            .iter()
-            .rposition(|&height| height <= 0.0)
-            .unwrap_or(0);
-        Ok(Stops {
-            radii,
-            heights,
-            ends_at_edge: edge.is_some(),
-            first,
-        })
+        let first = heights.iter().rposition(|&height| height <= 0.0).unwrap_or(0);
+        Ok(Stops { radii, heights, ends_at_edge: edge.is_some(), first })
     }
 
     /// A rim half-way to the first of the trailing infinite samples, at the last finite height.
     fn implied_edge(&self, samples: &[f64]) -> Option<ProfileEdge> {
-        let last = self
-            .heights_mm
-            .iter()
-            .rposition(|height| height.is_finite())?;
+        let last = self.heights_mm.iter().rposition(|height| height.is_finite())?;
         let next = samples.get(last + 1)?;
         let radius_mm = (0.5 * (samples[last] + next)).max(samples[1]);
-        Some(ProfileEdge {
-            radius_mm,
-            height_mm: self.heights_mm[last],
-        })
+        Some(ProfileEdge { radius_mm, height_mm: self.heights_mm[last] })
     }
 }

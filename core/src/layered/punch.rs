@@ -47,30 +47,15 @@ pub fn solve_punches(bed: &LayeredBed, grid: &RadialGrid) -> Result<Vec<Punch>, 
     (0..PUNCHES)
         .map(|punch| {
             let edge = RadialGrid::punch_node(punch);
-            let (phi, depth) = solve_phi(&operators.inside, nodes, edge, diagonal).ok_or(
-                LayeredError::NotPositiveDefinite {
-                    radius_mm: nodes[edge],
-                },
-            )?;
-            Ok(surface(
-                &operators,
-                &phi,
-                depth,
-                diagonal,
-                half_space_radial,
-                nodes,
-            ))
+            let (phi, depth) = solve_phi(&operators.inside, nodes, edge, diagonal)
+                .ok_or(LayeredError::NotPositiveDefinite { radius_mm: nodes[edge] })?;
+            Ok(surface(&operators, &phi, depth, diagonal, half_space_radial, nodes))
         })
         .collect()
 }
 
 /// φ (1/mm) and depth (mm) per unit force of the punch whose edge is node `edge`; `None` if the matrix is not positive definite.
-fn solve_phi(
-    inside: &ElementWeights,
-    nodes: &[f64],
-    edge: usize,
-    diagonal: f64,
-) -> Option<(Vec<f64>, f64)> {
+fn solve_phi(inside: &ElementWeights, nodes: &[f64], edge: usize, diagonal: f64) -> Option<(Vec<f64>, f64)> {
     let mut matrix = DMatrix::<f64>::zeros(edge + 1, edge + 1);
     let mut unit = DVector::<f64>::zeros(edge + 1);
     for element in 0..edge {
@@ -106,27 +91,20 @@ fn surface(
     nodes: &[f64],
 ) -> Punch {
     let edge = phi.len() - 1;
-    let mut outside: Vec<f64> = (edge..nodes.len())
-        .map(|node| operators.line.apply(node, 0, phi))
-        .collect();
+    let mut outside: Vec<f64> = (edge..nodes.len()).map(|node| operators.line.apply(node, 0, phi)).collect();
     if edge < operators.inside.left.nrows() {
         // Just outside of the edge W may fall within a membrane's thickness; what counts is its trend over the element.
         let [near, far] = [1, 2].map(|point| operators.inside.apply(4 * edge + point, 0, phi));
         let slope = (far - near) / (GAUSS_4[2].0 - GAUSS_4[1].0);
         outside[0] = near - GAUSS_4[1].0 * slope;
     }
-    let shear: Vec<f64> = (0..nodes.len())
-        .map(|node| operators.sine.apply(node, 0, phi))
-        .collect();
-    let beyond: Vec<f64> = (0..nodes.len())
-        .map(|node| operators.force.apply(node, 0, phi))
-        .collect();
+    let shear: Vec<f64> = (0..nodes.len()).map(|node| operators.sine.apply(node, 0, phi)).collect();
+    let beyond: Vec<f64> = (0..nodes.len()).map(|node| operators.force.apply(node, 0, phi)).collect();
     let downward = |(node, &r): (usize, &f64)| {
         if node <= edge {
             return depth;
         }
-        surface_from_line(r, 0.0, nodes[edge], depth, depth)
-            + operators.surface.apply(node, edge, &outside)
+        surface_from_line(r, 0.0, nodes[edge], depth, depth) + operators.surface.apply(node, edge, &outside)
     };
     let outward = |(node, &r): (usize, &f64)| {
         if node == 0 {

@@ -31,39 +31,20 @@ impl LinearBed {
                 add(&mut radial, force, &table.radial);
             }
         }
-        let edges: Vec<(PunchBlend, f64)> = indentation
-            .partial_punches
-            .iter()
-            .map(|p| (self.blend(p.radius_mm), p.force_mn))
-            .collect();
+        let edges: Vec<(PunchBlend, f64)> =
+            indentation.partial_punches.iter().map(|p| (self.blend(p.radius_mm), p.force_mn)).collect();
         for (blend, force) in &edges {
             // Flat under the punch, whatever the blend of its neighbours says.
             let within = nodes.partition_point(|&r| r <= blend.radius);
-            normal[..within]
-                .iter_mut()
-                .for_each(|u| *u -= force * (blend.depth - blend.edge_normal));
+            normal[..within].iter_mut().for_each(|u| *u -= force * (blend.depth - blend.edge_normal));
             for (index, weight) in blend.weights() {
                 if weight > 0.0 {
-                    add(
-                        &mut normal[within..],
-                        force * weight,
-                        &self.punches[index].smooth_normal[within..],
-                    );
-                    add(
-                        &mut radial,
-                        force * weight,
-                        &self.punches[index].smooth_radial,
-                    );
+                    add(&mut normal[within..], force * weight, &self.punches[index].smooth_normal[within..]);
+                    add(&mut radial, force * weight, &self.punches[index].smooth_radial);
                 }
             }
         }
-        SurfaceResponse {
-            nodes,
-            bed: self,
-            normal,
-            radial,
-            edges,
-        }
+        SurfaceResponse { nodes, bed: self, normal, radial, edges }
     }
 }
 
@@ -89,12 +70,8 @@ impl SurfaceResponse<'_> {
     fn cubic(&self, values: &[f64], at: usize, r: f64) -> f64 {
         let step = self.nodes[at + 1] - self.nodes[at];
         let (x, y) = ((r - self.nodes[at]) / step, (self.nodes[at + 1] - r) / step);
-        let (slope0, slope1) = (
-            self.slope(values, at) * step,
-            self.slope(values, at + 1) * step,
-        );
-        y * y * ((1.0 + 2.0 * x) * values[at] + x * slope0)
-            + x * x * ((1.0 + 2.0 * y) * values[at + 1] - y * slope1)
+        let (slope0, slope1) = (self.slope(values, at) * step, self.slope(values, at + 1) * step);
+        y * y * ((1.0 + 2.0 * x) * values[at] + x * slope0) + x * x * ((1.0 + 2.0 * y) * values[at + 1] - y * slope1)
     }
 
     /// Slope of the parabola through a node and its neighbours; at the outer end, of the parabola through the last three; on the axis, of
@@ -107,10 +84,7 @@ impl SurfaceResponse<'_> {
         if node + 1 == values.len() {
             return 2.0 * chord(node - 1) - self.slope(values, node - 1);
         }
-        let (before, after) = (
-            self.nodes[node] - self.nodes[node - 1],
-            self.nodes[node + 1] - self.nodes[node],
-        );
+        let (before, after) = (self.nodes[node] - self.nodes[node - 1], self.nodes[node + 1] - self.nodes[node]);
         (after * chord(node - 1) + before * chord(node)) / (before + after)
     }
 }

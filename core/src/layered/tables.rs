@@ -51,10 +51,8 @@ impl PunchTable {
     /// Splits and samples the solution.
     pub fn new(radius: f64, punch: &Punch, grid: &RadialGrid) -> Self {
         let nodes = grid.nodes_mm.iter();
-        let smooth_nodes: Vec<f64> = nodes
-            .zip(&punch.normal)
-            .map(|(&r, u)| u + punch.edge_normal * edge_shape_normal(radius, r))
-            .collect();
+        let smooth_nodes: Vec<f64> =
+            nodes.zip(&punch.normal).map(|(&r, u)| u + punch.edge_normal * edge_shape_normal(radius, r)).collect();
         let samples = grid.samples_mm.iter();
         let smooth_radial = samples
             .zip(at_samples(&punch.radial))
@@ -79,17 +77,11 @@ impl StretchTable {
         let mix = |values: fn(&Punch) -> &[f64]| -> Vec<f64> {
             let mut sum = vec![0.0; values(&punches[0]).len()];
             for (punch, (_, part)) in punches.iter().zip(parts) {
-                sum.iter_mut()
-                    .zip(values(punch))
-                    .for_each(|(sum, value)| *sum += part * value);
+                sum.iter_mut().zip(values(punch)).for_each(|(sum, value)| *sum += part * value);
             }
             sum
         };
-        let depth: f64 = punches
-            .iter()
-            .zip(parts)
-            .map(|(punch, (_, part))| part * punch.depth)
-            .sum();
+        let depth: f64 = punches.iter().zip(parts).map(|(punch, (_, part))| part * punch.depth).sum();
         let normal = mix(|punch| &punch.normal);
         let closing_nodes: Vec<f64> = normal.iter().map(|u| (depth + u).max(0.0)).collect();
         Self {
@@ -105,33 +97,20 @@ impl StretchTable {
 
 /// The values at all samples out of those at the grid's nodes.
 fn at_samples(nodes: &[f64]) -> Vec<f64> {
-    (0..=nodes.len() / 3)
-        .map(|sample| nodes[RadialGrid::sample_node(sample)])
-        .collect()
+    (0..=nodes.len() / 3).map(|sample| nodes[RadialGrid::sample_node(sample)]).collect()
 }
 
 /// Forces on the rings between the profile's samples from the forces beyond the nodes.
 fn ring_forces(beyond: &[f64]) -> Vec<f64> {
-    at_samples(beyond)[..=STRETCHES]
-        .windows(2)
-        .map(|pair| pair[0] - pair[1])
-        .collect()
+    at_samples(beyond)[..=STRETCHES].windows(2).map(|pair| pair[0] - pair[1]).collect()
 }
 
 /// Shape (2/π) asin(min(1, a/r)) of u_z under a punch on a half-space.
 pub(super) fn edge_shape_normal(a: f64, r: f64) -> f64 {
-    if r <= a {
-        1.0
-    } else {
-        FRAC_2_PI * (a / r).asin()
-    }
+    if r <= a { 1.0 } else { FRAC_2_PI * (a / r).asin() }
 }
 
 /// Shape (a − √(a² − r²))/r of u_r under a punch on a half-space.
 pub(super) fn edge_shape_radial(a: f64, r: f64) -> f64 {
-    if r <= 0.0 {
-        0.0
-    } else {
-        (a - cut_root(a, r)) / r
-    }
+    if r <= 0.0 { 0.0 } else { (a - cut_root(a, r)) / r }
 }

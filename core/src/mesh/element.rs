@@ -111,10 +111,7 @@ fn serendipity(at: [f64; 3], node: [f64; 3]) -> Shape {
             if k == mid { (1.0 - at[k] * at[k], -2.0 * at[k]) } else { (1.0 + node[k] * at[k], node[k]) }
         };
         let [(a, da), (b, db), (c, dc)] = [along(0), along(1), along(2)];
-        return Shape {
-            value: 0.25 * a * b * c,
-            gradient: [0.25 * da * b * c, 0.25 * a * db * c, 0.25 * a * b * dc],
-        };
+        return Shape { value: 0.25 * a * b * c, gradient: [0.25 * da * b * c, 0.25 * a * db * c, 0.25 * a * b * dc] };
     }
     let [a, b, c] = [0, 1, 2].map(|k| 1.0 + node[k] * at[k]);
     let s = a + b + c - 5.0;
@@ -145,8 +142,7 @@ pub fn gauss_rule(points: usize) -> Vec<(f64, f64)> {
         4 => {
             let root = 2.0 / 7.0 * (6.0_f64 / 5.0).sqrt();
             let (inner, outer) = ((3.0 / 7.0 - root).sqrt(), (3.0 / 7.0 + root).sqrt());
-            let (w_inner, w_outer) =
-                ((18.0 + 30.0_f64.sqrt()) / 36.0, (18.0 - 30.0_f64.sqrt()) / 36.0);
+            let (w_inner, w_outer) = ((18.0 + 30.0_f64.sqrt()) / 36.0, (18.0 - 30.0_f64.sqrt()) / 36.0);
             vec![(-outer, w_outer), (-inner, w_inner), (inner, w_inner), (outer, w_outer)]
         }
         5 => {
@@ -154,13 +150,7 @@ pub fn gauss_rule(points: usize) -> Vec<(f64, f64)> {
             let (inner, outer) = ((5.0 - root).sqrt() / 3.0, (5.0 + root).sqrt() / 3.0);
             let spread = 13.0 * 70.0_f64.sqrt();
             let (w_inner, w_outer) = ((322.0 + spread) / 900.0, (322.0 - spread) / 900.0);
-            vec![
-                (-outer, w_outer),
-                (-inner, w_inner),
-                (0.0, 128.0 / 225.0),
-                (inner, w_inner),
-                (outer, w_outer),
-            ]
+            vec![(-outer, w_outer), (-inner, w_inner), (0.0, 128.0 / 225.0), (inner, w_inner), (outer, w_outer)]
         }
         other => panic!("no Gauss rule with {other} points is tabulated"),
     }

@@ -49,8 +49,7 @@ impl Dissection<'_> {
             let right = sorted.split_off(sorted.len() / 2);
             (self.shared(&sorted, &right), sorted, right)
         });
-        let (separator, left, right) =
-            halves.into_iter().min_by_key(|(shared, ..)| shared.len()).unwrap_or_default();
+        let (separator, left, right) = halves.into_iter().min_by_key(|(shared, ..)| shared.len()).unwrap_or_default();
         self.place(separator, order);
         self.split(left, order);
         self.split(right, order);

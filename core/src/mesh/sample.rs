@@ -22,7 +22,8 @@ pub fn locate(topology: &WallTopology, geometry: &WallGeometry, at: [f64; 2]) ->
         let nodes: Vec<[f64; 2]> =
             face.iter().map(|&vertex| geometry.parameters[topology.vertices[vertex].0]).collect();
         let inside_box = (0..2).all(|k| {
-            let (low, high) = nodes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), n| (l.min(n[k]), h.max(n[k])));
+            let (low, high) =
+                nodes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), n| (l.min(n[k]), h.max(n[k])));
             let margin = 0.25 * (high - low);
             at[k] >= low - margin && at[k] <= high + margin
         });
@@ -70,7 +71,9 @@ impl SurfaceSample {
     pub fn interpolate(&self, field: &[f64]) -> Vector3<f64> {
         self.weights
             .iter()
-            .map(|&(vertex, weight)| Vector3::new(field[3 * vertex], field[3 * vertex + 1], field[3 * vertex + 2]) * weight)
+            .map(|&(vertex, weight)| {
+                Vector3::new(field[3 * vertex], field[3 * vertex + 1], field[3 * vertex + 2]) * weight
+            })
             .sum()
     }
 }

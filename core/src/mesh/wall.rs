@@ -81,9 +81,8 @@ impl WallTopology {
             .collect();
 
         let offsets = &*NODE_OFFSETS;
-        let lattice = |cell: &[usize], layer: usize, [i, j, k]: [usize; 3]| {
-            (cell[j * (ORDER + 1) + i], layer * ORDER + k)
-        };
+        let lattice =
+            |cell: &[usize], layer: usize, [i, j, k]: [usize; 3]| (cell[j * (ORDER + 1) + i], layer * ORDER + k);
         let mut used: HashMap<usize, Vec<usize>> = HashMap::new();
         for cell in &cells {
             for layer in 0..layers.len() {
@@ -194,8 +193,7 @@ impl WallGeometry {
         }
         rest.extend_from_slice(&[0.0; 3]);
         let solid = SolidGeometry::new(&topology.elements, &rest)?;
-        let layer_coordinates =
-            topology.vertices.iter().map(|&(_, level)| levels[level].layer_coordinate).collect();
+        let layer_coordinates = topology.vertices.iter().map(|&(_, level)| levels[level].layer_coordinate).collect();
         Ok(WallGeometry { parameters, rest, layer_coordinates, solid })
     }
 }

@@ -84,14 +84,7 @@ impl Body {
         // The lowest point of a² + b² = r² over the sharp corner lies at the origin when the core's corner stands here.
         let length = (1.0 + cos * cos).sqrt();
         let corner = (-edge_radius * cos / length, edge_radius * length / sin);
-        Self {
-            core_radius,
-            edge_radius,
-            axis_x: corner.0 - core_radius,
-            corner,
-            plane_normal: (-cos, -sin),
-            smoothing,
-        }
+        Self { core_radius, edge_radius, axis_x: corner.0 - core_radius, corner, plane_normal: (-cos, -sin), smoothing }
     }
 
     fn coordinates(&self, local: &Point3<f64>) -> Coordinates {
@@ -106,6 +99,11 @@ impl Body {
         }
     }
 
+    /// Where the axis of the shaft meets the local x axis [mm].
+    pub fn axis_x_mm(&self) -> f64 {
+        self.axis_x
+    }
+
     /// Radius of the shaft [mm].
     pub fn radius_mm(&self) -> f64 {
         self.core_radius + self.edge_radius
@@ -113,31 +111,14 @@ impl Body {
 
     /// Signed distance to the needle's surface at a needle-local point, mm, negative inside.
     pub fn distance(&self, local: &Point3<f64>) -> f64 {
-        let Coordinates {
-            outside_cylinder: a,
-            beyond_plane: b,
-            ..
-        } = self.coordinates(local);
-        let reach = if a > 0.0 && b > 0.0 {
-            (a * a + b * b).sqrt()
-        } else {
-            a.max(b)
-        };
+        let Coordinates { outside_cylinder: a, beyond_plane: b, .. } = self.coordinates(local);
+        let reach = if a > 0.0 && b > 0.0 { (a * a + b * b).sqrt() } else { a.max(b) };
         reach - self.edge_radius
     }
 
     /// [`distance`](Self::distance), mm, and its slope along `direction` (needle-local, per unit of its length).
-    pub(super) fn distance_along(
-        &self,
-        local: &Point3<f64>,
-        direction: &Vector3<f64>,
-    ) -> (f64, f64) {
-        let Coordinates {
-            outside_cylinder: a,
-            beyond_plane: b,
-            radial,
-            ..
-        } = self.coordinates(local);
+    pub(super) fn distance_along(&self, local: &Point3<f64>, direction: &Vector3<f64>) -> (f64, f64) {
+        let Coordinates { outside_cylinder: a, beyond_plane: b, radial, .. } = self.coordinates(local);
         let a_slope = radial.0 * direction.x + radial.1 * direction.y;
         let b_slope = self.plane_normal.0 * direction.x + self.plane_normal.1 * direction.z;
         let (reach, slope) = if a > 0.0 && b > 0.0 {
@@ -173,9 +154,7 @@ impl Body {
         let (reach, gradient, hessian) = if a > 0.0 && b > 0.0 {
             let reach = (a * a + b * b).sqrt().max(self.smoothing);
             let gradient = (a_gradient * a + b_gradient * b) / reach;
-            let curvature = a_gradient * a_gradient.transpose()
-                + b_gradient * b_gradient.transpose()
-                + a_hessian * a
+            let curvature = a_gradient * a_gradient.transpose() + b_gradient * b_gradient.transpose() + a_hessian * a
                 - gradient * gradient.transpose();
             (reach, gradient, curvature / reach)
         } else if a > b {
@@ -183,11 +162,7 @@ impl Body {
         } else {
             (b, b_gradient, Matrix3::zeros())
         };
-        SignedDistance {
-            value: reach - self.edge_radius,
-            gradient,
-            hessian,
-        }
+        SignedDistance { value: reach - self.edge_radius, gradient, hessian }
     }
 
     /// The point of the needle furthest along a needle-local direction, in needle-local coordinates, mm.

@@ -22,36 +22,12 @@ pub struct Gauge {
 
 /// Every known gauge, from thin to thick.
 pub const GAUGES: [Gauge; 6] = [
-    Gauge {
-        name: "41G",
-        outer_diameter_mm: 0.10,
-        source: CANNULA,
-    },
-    Gauge {
-        name: "38G",
-        outer_diameter_mm: 0.12,
-        source: CANNULA,
-    },
-    Gauge {
-        name: "30G",
-        outer_diameter_mm: 0.311,
-        source: CHART,
-    },
-    Gauge {
-        name: "27G",
-        outer_diameter_mm: 0.413,
-        source: CHART,
-    },
-    Gauge {
-        name: "25G",
-        outer_diameter_mm: 0.514,
-        source: CHART,
-    },
-    Gauge {
-        name: "23G",
-        outer_diameter_mm: 0.641,
-        source: CHART,
-    },
+    Gauge { name: "41G", outer_diameter_mm: 0.10, source: CANNULA },
+    Gauge { name: "38G", outer_diameter_mm: 0.12, source: CANNULA },
+    Gauge { name: "30G", outer_diameter_mm: 0.311, source: CHART },
+    Gauge { name: "27G", outer_diameter_mm: 0.413, source: CHART },
+    Gauge { name: "25G", outer_diameter_mm: 0.514, source: CHART },
+    Gauge { name: "23G", outer_diameter_mm: 0.641, source: CHART },
 ];
 
 /// A name that stands for no gauge.
@@ -70,10 +46,7 @@ impl Gauge {
         GAUGES
             .into_iter()
             .find(|gauge| gauge.name == name)
-            .ok_or_else(|| UnknownGauge {
-                name: name.to_owned(),
-                allowed: GAUGES.map(|gauge| gauge.name).to_vec(),
-            })
+            .ok_or_else(|| UnknownGauge { name: name.to_owned(), allowed: GAUGES.map(|gauge| gauge.name).to_vec() })
     }
 
     /// Outer radius, mm.

@@ -74,31 +74,19 @@ pub struct NeedleShape {
 impl NeedleShape {
     /// A needle that ends in half a ball.
     pub fn hemispherical(radius_mm: f64) -> Self {
-        Self {
-            radius_mm,
-            tip: Tip::Hemispherical,
-        }
+        Self { radius_mm, tip: Tip::Hemispherical }
     }
 
     /// A needle cut straight across, with the default edge.
     pub fn flat(radius_mm: f64) -> Self {
         let edge_radius_mm = EDGE_FRACTION_OF_RADIUS * radius_mm;
-        Self {
-            radius_mm,
-            tip: Tip::Flat { edge_radius_mm },
-        }
+        Self { radius_mm, tip: Tip::Flat { edge_radius_mm } }
     }
 
     /// A needle cut at the default angle, with the default edge.
     pub fn bevelled(radius_mm: f64) -> Self {
         let edge_radius_mm = EDGE_FRACTION_OF_RADIUS * radius_mm;
-        Self {
-            radius_mm,
-            tip: Tip::Bevelled {
-                angle_deg: BEVEL_ANGLE.default,
-                edge_radius_mm,
-            },
-        }
+        Self { radius_mm, tip: Tip::Bevelled { angle_deg: BEVEL_ANGLE.default, edge_radius_mm } }
     }
 
     /// Radius of the rounded edge, mm; the needle's own radius where the tip is half a ball.
@@ -112,10 +100,7 @@ impl NeedleShape {
     /// Holds every number against its range; fails with the first that is outside, as `needle.radius_mm`, `needle.tip.…`.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         RADIUS.check("needle.radius_mm", self.radius_mm)?;
-        let edge = ParameterRange {
-            max: self.radius_mm,
-            ..EDGE_RADIUS
-        };
+        let edge = ParameterRange { max: self.radius_mm, ..EDGE_RADIUS };
         edge.check("needle.tip.edge_radius_mm", self.edge_radius_mm())?;
         match self.tip {
             Tip::Bevelled { angle_deg, .. } => BEVEL_ANGLE.check("needle.tip.angle_deg", angle_deg),

@@ -91,30 +91,20 @@ impl Body {
                 if walk.missed {
                     continue;
                 }
-                let height =
-                    self.height_on_ray(&(base + direction * radius), &up, walk.guess(radius));
+                let height = self.height_on_ray(&(base + direction * radius), &up, walk.guess(radius));
                 walk.record(radius, height);
                 if let Some(height) = height {
                     sum += weight * height;
                     hits += weight;
                 }
             }
-            heights.push(if hits >= LEAST_HITS {
-                sum / hits
-            } else {
-                f64::INFINITY
-            });
+            heights.push(if hits >= LEAST_HITS { sum / hits } else { f64::INFINITY });
         }
         Some(heights)
     }
 
     /// The lateral directions to walk and the share of each in the average; mirrored and equal directions are walked once.
-    fn azimuths(
-        &self,
-        up: &Vector3<f64>,
-        across: &Vector3<f64>,
-        base: &Point3<f64>,
-    ) -> Vec<(Vector3<f64>, f64)> {
+    fn azimuths(&self, up: &Vector3<f64>, across: &Vector3<f64>, base: &Point3<f64>) -> Vec<(Vector3<f64>, f64)> {
         let aside = up.cross(across);
         let revolved = self.plane_normal.0 == 0.0;
         let on_axis = (base.x - self.axis_x).hypot(base.y) < ALIGNED;
@@ -123,14 +113,12 @@ impl Body {
         }
         // `across` lies in the plane of the axis and `up`; a bevel is its own mirror image only if that is its own plane.
         let from_axis = Vector3::new(base.x - self.axis_x, base.y, 0.0);
-        let mirrored = aside.dot(&from_axis).abs() < ALIGNED
-            && (revolved || up.y.abs() < ALIGNED)
-            && aside.z.abs() < ALIGNED;
+        let mirrored =
+            aside.dot(&from_axis).abs() < ALIGNED && (revolved || up.y.abs() < ALIGNED) && aside.z.abs() < ALIGNED;
         let walked = if mirrored { AZIMUTHS / 2 + 1 } else { AZIMUTHS };
         (0..walked)
             .map(|index| {
-                let (sin, cos) =
-                    libm::sincos(index as f64 * std::f64::consts::TAU / AZIMUTHS as f64);
+                let (sin, cos) = libm::sincos(index as f64 * std::f64::consts::TAU / AZIMUTHS as f64);
                 let twice = mirrored && index != 0 && index != AZIMUTHS / 2;
                 let weight = if twice { 2.0 } else { 1.0 } / AZIMUTHS as f64;
                 (across * cos + aside * sin, weight)
@@ -143,16 +131,15 @@ impl Body {
         if self.core_radius == 0.0 && self.plane_normal.0 == 0.0 {
             let from_centre = origin - Point3::new(0.0, 0.0, self.edge_radius);
             let towards = -from_centre.dot(up);
-            let half_chord_squared = towards * towards
-                - (from_centre.norm_squared() - self.edge_radius * self.edge_radius);
+            let half_chord_squared =
+                towards * towards - (from_centre.norm_squared() - self.edge_radius * self.edge_radius);
             let height = towards - half_chord_squared.max(0.0).sqrt();
             if half_chord_squared >= 0.0 && from_centre.z + height * up.z <= 0.0 {
                 return Some(height);
             }
         }
         // A guess may lie beyond the needle, where the distance no longer falls; the touching plane never does.
-        self.advance(origin, up, guess)
-            .or_else(|| self.advance(origin, up, 0.0))
+        self.advance(origin, up, guess).or_else(|| self.advance(origin, up, 0.0))
     }
 
     /// Newton's method from a start on the ray; `None` where the distance does not fall along the ray.
@@ -176,10 +163,6 @@ impl Body {
 /// A unit vector across `up`: towards the shaft's lean, or the needle's own x where the shaft stands upright.
 fn lateral_axis(up: &Vector3<f64>) -> Vector3<f64> {
     let leaning = Vector3::z() - up * up.z;
-    let towards = if leaning.norm() < ALIGNED {
-        Vector3::x() - up * up.x
-    } else {
-        leaning
-    };
+    let towards = if leaning.norm() < ALIGNED { Vector3::x() - up * up.x } else { leaning };
     towards.normalize()
 }

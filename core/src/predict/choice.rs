@@ -56,7 +56,9 @@ pub fn decide(choice: &EffectChoice, level: Level, expected: Expected) -> Result
     let reason = match (why, possible) {
         (_, false) => "level `linear` is small-strain by construction".to_owned(),
         (Some(why), _) => why.to_owned(),
-        (None, _) if called_for => "the linear answer's strain times its depth exceeds what may be neglected [µm]".to_owned(),
+        (None, _) if called_for => {
+            "the linear answer's strain times its depth exceeds what may be neglected [µm]".to_owned()
+        }
         (None, _) => "the linear answer's strain times its depth may be neglected [µm]".to_owned(),
     };
     let plain = |name, simulated, reason: &str| EffectReport {
@@ -76,7 +78,11 @@ pub fn decide(choice: &EffectChoice, level: Level, expected: Expected) -> Result
             value: Some(linearisation_error_um),
             threshold: Some(AUTO_TOLERANCE_UM),
         },
-        plain(contact::NAME, contact, if contact { "the needle reaches the surface" } else { "as listed in the request" }),
+        plain(
+            contact::NAME,
+            contact,
+            if contact { "the needle reaches the surface" } else { "as listed in the request" },
+        ),
     ];
     let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
     Ok(Decision { solid, contact, reports })

@@ -90,9 +90,6 @@ pub struct ContactEstimate {
 
 /// Smallest contact radius that a mesh is made for, in needle radii.
 const SMALLEST_CONTACT: f64 = 0.05;
-/// How much further than estimated the needle stands at the start of a solve, so that the contact is closed [mm].
-const START_OVERLAP_MM: f64 = 5e-4;
-
 /// The answer of a finite-element level, patch frame.
 pub struct FiniteElementAnswer {
     /// Displacement of each node of the patch [mm].
@@ -156,9 +153,12 @@ impl Problem<'_> {
             Wall::new(topology, &self.patch.surface, self.tissue, &disc, self.solid, resolution.contact, self.tool)?;
         let touch_mm = wall.touch(&self.motion.direction, estimate.touch_mm).unwrap_or(estimate.touch_mm);
         let motion = match self.motion.force_mn {
-            Some(_) => {
+            Some(force_mn) => {
                 let beyond = (estimate.travel_mm - estimate.touch_mm).max(0.0);
-                Motion { travel_mm: touch_mm + beyond + START_OVERLAP_MM, ..self.motion }
+                let area = std::f64::consts::PI
+                    * estimate.radius_mm.max(SMALLEST_CONTACT * self.tool.body.radius_mm()).powi(2);
+                let overlap = force_mn / area / resolution.contact.stiffness_kpa_per_mm;
+                Motion { travel_mm: touch_mm + beyond + overlap, ..self.motion }
             }
             None => self.motion,
         };

@@ -6,11 +6,11 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::beds::{Bed, Beds};
+use super::beds::Beds;
 use super::types::PredictError;
 use crate::approach::{Touch, first_touch};
 use crate::equilibrium::{Motion, Tool};
-use crate::layered::{Indentation, RigidProfile, SurfaceResponse};
+use crate::layered::{Indentation, LayeredError, RigidProfile, SurfaceResponse};
 use crate::needle::Tip;
 use crate::patch::Patch;
 
@@ -71,12 +71,20 @@ fn angle_deg(a: &Unit<Vector3<f64>>, b: &Unit<Vector3<f64>>) -> f64 {
     a.dot(b).clamp(-1.0, 1.0).acos().to_degrees()
 }
 
-fn check_angle(field: &'static str, along: &Unit<Vector3<f64>>, inward: &Unit<Vector3<f64>>) -> Result<(), PredictError> {
+fn check_angle(
+    field: &'static str,
+    along: &Unit<Vector3<f64>>,
+    inward: &Unit<Vector3<f64>>,
+) -> Result<(), PredictError> {
     let angle_deg = angle_deg(along, inward);
     if angle_deg <= MAX_ANGLE_DEG {
         return Ok(());
     }
     Err(PredictError::PointsAway { field, angle_deg, max_deg: MAX_ANGLE_DEG })
+}
+
+fn shaft_first() -> PredictError {
+    PredictError::Linear("the shaft touches before the tip".to_owned())
 }
 
 /// The bed under one contact, pressed.
@@ -101,14 +109,58 @@ impl<'a> LinearAnswer<'a> {
     ///
     /// # Errors
     /// [`PredictError::Linear`].
-    pub fn new(beds: &'a Beds, patch: &Patch, tool: &Tool, tip: Tip, press: Press, direction: &Unit<Vector3<f64>>) -> Result<Self, PredictError> {
-        let failed = |error: crate::layered::LayeredError| PredictError::Linear(error.to_string());
+    pub fn new(
+        beds: &'a Beds,
+        patch: &Patch,
+        tool: &Tool,
+        tip: Tip,
+        press: Press,
+        direction: &Unit<Vector3<f64>>,
+    ) -> Result<Self, PredictError> {
         let inward = tool.patch_from_needle.inverse_transform_unit_vector(&press.touch.inward);
-        let about = match tip {
-            Tip::Hemispherical => tool.body.foremost_along(&inward),
-            // The foremost point of a flat tip jumps from its centre to its edge with the first tilt; the axis does not.
-            Tip::Flat { .. } | Tip::Bevelled { .. } => Some(Point3::origin()),
+        let foremost = tool.body.foremost_along(&inward).ok_or_else(shaft_first)?;
+        // A tilted flat tip stands on its rim under a light load and on its face under a heavy one: whichever yields less.
+        let supports = match tip {
+            Tip::Hemispherical => vec![foremost],
+            Tip::Flat { .. } | Tip::Bevelled { .. } => vec![foremost, Point3::new(tool.body.axis_x_mm(), 0.0, 0.0)],
         };
+        let mut best: Option<Self> = None;
+        for support in supports {
+            let offset = tool.patch_from_needle.rotation * (support - foremost);
+            let answer = match Self::about(beds, patch, tool, press, direction, &inward, &support, &offset) {
+                // The second support may have no underside around it (the axis of a bevel seen from its side).
+                Err(_) if best.is_some() => continue,
+                answer => answer?,
+            };
+            if best.as_ref().is_none_or(|best| answer.prefers_over(best)) {
+                best = Some(answer);
+            }
+        }
+        best.ok_or_else(shaft_first)
+    }
+
+    /// Of two supports the one that yields less: less depth for the force, or more force for the depth.
+    fn prefers_over(&self, other: &Self) -> bool {
+        match self.press.load {
+            Load::Force(_) => self.depth_mm < other.depth_mm,
+            Load::Depth(_) => self.normal_force_mn > other.normal_force_mn,
+        }
+    }
+
+    /// The answer for a contact around the axis through `support` (needle coordinates), which lies `offset` from the foremost point
+    /// (patch coordinates).
+    #[allow(clippy::too_many_arguments)]
+    fn about(
+        beds: &'a Beds,
+        patch: &Patch,
+        tool: &Tool,
+        press: Press,
+        direction: &Unit<Vector3<f64>>,
+        inward: &Unit<Vector3<f64>>,
+        support: &Point3<f64>,
+        offset: &Vector3<f64>,
+    ) -> Result<Self, PredictError> {
+        let failed = |error: LayeredError| PredictError::Linear(error.to_string());
         let [x, y] = press.touch.parameter;
         let thinning = patch.surface.column(x, y).retina_thinning_mm;
         let mut answer = LinearAnswer {
@@ -121,16 +173,18 @@ impl<'a> LinearAnswer<'a> {
             pressed: Vec::new(),
         };
         for (bed, weight) in beds.around(thinning)? {
-            let Bed { linear, .. } = bed;
-            let heights = about.and_then(|about| tool.body.underside_profile(&inward, &about, linear.sample_radii_mm()));
-            let heights = heights.ok_or_else(|| PredictError::Linear("the shaft touches before the tip".to_owned()))?;
+            let linear = &bed.linear;
+            let heights =
+                tool.body.underside_profile(inward, support, linear.sample_radii_mm()).ok_or_else(shaft_first)?;
+            // The bed counts its depth from the profile's lowest point, this answer from the needle's.
+            let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
             let profile = RigidProfile { heights_mm: &heights, edge: None };
             let indentation: Indentation = match press.load {
                 Load::Force(force) => linear.indent_by_force(&profile, force),
-                Load::Depth(depth) => linear.indent_by_depth(&profile, depth.max(0.0)),
+                Load::Depth(depth) => linear.indent_by_depth(&profile, (depth - lowest).max(0.0)),
             }
             .map_err(failed)?;
-            answer.depth_mm += weight * indentation.depth_mm;
+            answer.depth_mm += weight * (indentation.depth_mm + lowest);
             answer.normal_force_mn += weight * indentation.normal_force_mn;
             answer.contact_radius_mm += weight * indentation.contact_radius_mm;
             let pressure = linear.ring_pressures_kpa(&indentation).into_iter().fold(0.0, f64::max);
@@ -138,7 +192,7 @@ impl<'a> LinearAnswer<'a> {
             answer.pressed.push((weight, linear.surface_response(&indentation)));
         }
         let lateral = direction.into_inner() - press.touch.inward.into_inner() * press.cosine;
-        let shift = lateral * (answer.depth_mm / press.cosine);
+        let shift = lateral * (answer.depth_mm / press.cosine) + offset;
         answer.center = [x + shift.x, y + shift.y];
         Ok(answer)
     }

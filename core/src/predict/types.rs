@@ -165,7 +165,9 @@ pub enum PredictError {
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
     /// The needle or the force points out of the tissue, or along its surface.
-    #[error("{field} leans {angle_deg:.1} degrees from the inward surface normal; at most {max_deg} degrees are allowed")]
+    #[error(
+        "{field} leans {angle_deg:.1} degrees from the inward surface normal; at most {max_deg} degrees are allowed"
+    )]
     PointsAway {
         /// `needle.direction` or `force_mn`.
         field: &'static str,
@@ -175,7 +177,9 @@ pub enum PredictError {
         max_deg: f64,
     },
     /// The contact would lie outside of the patch.
-    #[error("the needle meets the tissue at ({x_mm:.3}, {y_mm:.3}) mm of the patch frame, outside of the patch (at most {limit_mm} mm from its centre in x and y)")]
+    #[error(
+        "the needle meets the tissue at ({x_mm:.3}, {y_mm:.3}) mm of the patch frame, outside of the patch (at most {limit_mm} mm from its centre in x and y)"
+    )]
     OutsidePatch {
         /// Contact point, patch frame [mm].
         x_mm: f64,
@@ -185,7 +189,9 @@ pub enum PredictError {
         limit_mm: f64,
     },
     /// The force would drive this needle beyond the depth for which the tissue model holds.
-    #[error("{force_mn} mN on a needle of {radius_mm} mm radius presses the tissue with {pressure_kpa:.1} kPa, beyond the limit of {limit_kpa:.1} kPa for this tissue (puncture)")]
+    #[error(
+        "{force_mn} mN on a needle of {radius_mm} mm radius presses the tissue with {pressure_kpa:.1} kPa, beyond the limit of {limit_kpa:.1} kPa for this tissue (puncture)"
+    )]
     BeyondPuncture {
         /// Force [mN].
         force_mn: f64,
@@ -196,10 +202,12 @@ pub enum PredictError {
         /// Largest allowed value of it [kPa].
         limit_kpa: f64,
     },
-    /// Under pose control: the needle stands deeper in the tissue than the model holds for.
-    #[error("the needle stands {depth_mm:.3} mm deep in the tissue, beyond the limit of {limit_mm:.3} mm")]
+    /// The needle would go deeper into the tissue than the model holds for.
+    #[error(
+        "the needle would stand {depth_mm:.3} mm deep in the tissue (by linear elasticity), beyond the limit of {limit_mm:.3} mm"
+    )]
     TooDeep {
-        /// Depth below the rest surface [mm].
+        /// Depth below the rest surface along its normal [mm].
         depth_mm: f64,
         /// Largest allowed depth [mm].
         limit_mm: f64,

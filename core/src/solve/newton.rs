@@ -58,6 +58,9 @@ pub struct NewtonSettings {
     pub max_iterations: usize,
     /// Largest travel of the driven vertex in one iteration [mm].
     pub max_travel_mm: f64,
+    /// Iterations at the beginning in which the driven vertex stays where it is: the tissue first adapts to a good guess of its
+    /// travel, whose small misfits a stiff contact would answer with large forces.
+    pub held_iterations: usize,
 }
 
 /// What a converged solve cost.
@@ -77,7 +80,9 @@ pub struct NewtonReport {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum NewtonError {
     /// The iteration limit was reached.
-    #[error("no equilibrium after {iterations} Newton iterations (residual {residual_mn:e} mN, wanted {tolerance_mn:e} mN)")]
+    #[error(
+        "no equilibrium after {iterations} Newton iterations (residual {residual_mn:e} mN, wanted {tolerance_mn:e} mN)"
+    )]
     NotConverged {
         /// Iterations made.
         iterations: usize,
@@ -264,16 +269,16 @@ impl System<'_> {
             let Workspace { scratch, values, .. } = workspace;
             hessian(self.terms, positions, &trial.predicted, self.pattern, scratch, values);
             report.shifts += self.factorize(workspace)?;
-            let (step, slope) = self.step(drive, settings, workspace)?;
+            let limit = if report.iterations < settings.held_iterations { 0.0 } else { settings.max_travel_mm };
+            let (step, slope) = self.step(drive, limit, workspace)?;
             report.iterations += 1;
             let taken = match settings.globalization {
                 Globalization::PredictedStress => {
                     self.full_step(positions, &step, &mut trial, drive, settings.force_scale_mn, workspace)
-                },
+                }
                 Globalization::LineSearch => self.line_search(positions, &step, slope, &mut trial, drive, workspace),
             };
-            let stuck =
-                NewtonError::NoStep { iterations: report.iterations, residual_mn: report.residual_mn };
+            let stuck = NewtonError::NoStep { iterations: report.iterations, residual_mn: report.residual_mn };
             let (halvings, residual_mn) = taken.ok_or(stuck)?;
             report.halvings += halvings;
             report.residual_mn = residual_mn;
@@ -362,11 +367,11 @@ impl System<'_> {
         Err(LinearSolveError::Indefinite.into())
     }
 
-    /// The Newton step (free unknowns, then the border) and the slope of the potential along it.
+    /// The Newton step (free unknowns, then the border), the travel limited, and the slope of the potential along it.
     fn step(
         &self,
         drive: Drive,
-        settings: &NewtonSettings,
+        max_travel_mm: f64,
         workspace: &mut Workspace,
     ) -> Result<(Vec<f64>, f64), NewtonError> {
         let free = self.dofs.free;
@@ -397,8 +402,8 @@ impl System<'_> {
                 let stiffness = own - dot(&coupling, response);
                 let drive = -out_of_balance - dot(&coupling, alone);
                 // Without stiffness (no contact yet, or past a limit point) only the sign of the drive is known.
-                travel = if stiffness > 0.0 { drive / stiffness } else { drive.signum() * settings.max_travel_mm };
-                travel = travel.clamp(-settings.max_travel_mm, settings.max_travel_mm);
+                travel = if stiffness > 0.0 { drive / stiffness } else { drive.signum() * max_travel_mm };
+                travel = travel.clamp(-max_travel_mm, max_travel_mm);
                 step = alone.iter().zip(response).map(|(a, r)| a - travel * r).collect();
             }
         }

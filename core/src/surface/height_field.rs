@@ -57,20 +57,13 @@ impl HeightField {
         }
         let grid = Grid::new(&vertices, &triangles);
         let rim = rim(&triangles);
-        Ok(Self {
-            vertices,
-            triangles,
-            rim,
-            grid,
-        })
+        Ok(Self { vertices, triangles, rim, grid })
     }
 
     /// Height over (x, y), mm.
     pub fn height(&self, x: f64, y: f64) -> f64 {
         let candidates = self.grid.cell(x, y);
-        let inside = candidates
-            .iter()
-            .find_map(|&triangle| self.height_in(triangle, x, y));
+        let inside = candidates.iter().find_map(|&triangle| self.height_in(triangle, x, y));
         inside.unwrap_or_else(|| self.height_of_nearest_rim(x, y))
     }
 
@@ -109,10 +102,7 @@ impl Grid {
             high = high.sup(&vertices[*corner].xy());
         }
         let extent = high - low;
-        let per_side = (triangles.len() as f64 / TRIANGLES_PER_CELL)
-            .sqrt()
-            .ceil()
-            .max(1.0);
+        let per_side = (triangles.len() as f64 / TRIANGLES_PER_CELL).sqrt().ceil().max(1.0);
         let boxes: Vec<[Vector2<f64>; 2]> = triangles
             .iter()
             .map(|corners| corners.map(|corner| vertices[corner].xy() - low))
@@ -120,11 +110,7 @@ impl Grid {
             .collect();
         // Long slivers each reach into many cells, so the cells grow until the lists are in proportion to the triangles.
         let mut cell_mm = extent.max() / per_side;
-        while boxes
-            .iter()
-            .map(|bounds| cells_covered(bounds, cell_mm))
-            .sum::<usize>()
-            > LISTED_LIMIT * triangles.len()
+        while boxes.iter().map(|bounds| cells_covered(bounds, cell_mm)).sum::<usize>() > LISTED_LIMIT * triangles.len()
         {
             cell_mm *= 2.0;
         }
@@ -140,25 +126,15 @@ impl Grid {
                 }
             }
         }
-        Self {
-            low,
-            cell_mm,
-            columns,
-            cells,
-        }
+        Self { low, cell_mm, columns, cells }
     }
 
     fn cell(&self, x: f64, y: f64) -> &[usize] {
-        let (column, row) = (
-            (x - self.low.x) / self.cell_mm,
-            (y - self.low.y) / self.cell_mm,
-        );
+        let (column, row) = ((x - self.low.x) / self.cell_mm, (y - self.low.y) / self.cell_mm);
         if column < 0.0 || row < 0.0 || column as usize >= self.columns {
             return &[];
         }
-        self.cells
-            .get(row as usize * self.columns + column as usize)
-            .map_or(&[], Vec::as_slice)
+        self.cells.get(row as usize * self.columns + column as usize).map_or(&[], Vec::as_slice)
     }
 }
 
@@ -176,9 +152,7 @@ fn rim(triangles: &[[usize; 3]]) -> Vec<[usize; 2]> {
         .map(|[from, to]| [from.min(to), from.max(to)])
         .collect();
     edges.sort_unstable();
-    let alone = edges
-        .chunk_by(|one, other| one == other)
-        .filter(|group| group.len() == 1);
+    let alone = edges.chunk_by(|one, other| one == other).filter(|group| group.len() == 1);
     alone.map(|group| group[0]).collect()
 }
 

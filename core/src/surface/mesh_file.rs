@@ -72,14 +72,9 @@ impl Polygons {
 
     /// Splits a polygon of at least three corners into a fan.
     pub(super) fn push_polygon(&mut self, corners: &[usize]) -> Result<(), MeshFileError> {
-        within(
-            "triangles",
-            self.triangles.len() + corners.len().saturating_sub(2),
-            TRIANGLE_LIMIT,
-        )?;
+        within("triangles", self.triangles.len() + corners.len().saturating_sub(2), TRIANGLE_LIMIT)?;
         if let [first, rest @ ..] = corners {
-            self.triangles
-                .extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+            self.triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
         }
         Ok(())
     }
@@ -95,10 +90,7 @@ pub(super) fn within(what: &'static str, count: usize, limit: usize) -> Result<(
 
 /// Reads a mesh in mm from the bytes of a file. Fails with [`MeshFileError`] and never panics.
 pub fn read_mesh(bytes: &[u8], format: MeshFormat) -> Result<TriangleMesh, MeshFileError> {
-    let Polygons {
-        vertices,
-        triangles,
-    } = match format {
+    let Polygons { vertices, triangles } = match format {
         MeshFormat::Ply => ply::read(bytes)?,
         MeshFormat::Obj => obj::read(bytes)?,
     };

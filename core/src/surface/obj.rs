@@ -19,9 +19,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Polygons, MeshFileError> {
         match words.next() {
             Some("v") => polygons.push_vertex(vertex(words).map_err(at_line)?)?,
             Some("f") => {
-                let corners: Result<Vec<usize>, String> = words
-                    .map(|word| corner(word, polygons.vertices.len()))
-                    .collect();
+                let corners: Result<Vec<usize>, String> =
+                    words.map(|word| corner(word, polygons.vertices.len())).collect();
                 let corners = corners.map_err(at_line)?;
                 if corners.len() < 3 {
                     return Err(at_line(format!("a face of {} corners", corners.len())));
@@ -35,10 +34,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Polygons, MeshFileError> {
 }
 
 fn malformed(reason: String) -> MeshFileError {
-    MeshFileError::Malformed {
-        format: MeshFormat::Obj,
-        reason,
-    }
+    MeshFileError::Malformed { format: MeshFormat::Obj, reason }
 }
 
 /// Three coordinates; a fourth, and colours after it, are ignored.
@@ -46,9 +42,7 @@ fn vertex<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<Point3<f64>, S
     let mut vertex = Point3::origin();
     for coordinate in vertex.iter_mut() {
         let word = words.next().ok_or("a vertex has three coordinates")?;
-        *coordinate = word
-            .parse()
-            .map_err(|_| format!("{word:?} is not a coordinate"))?;
+        *coordinate = word.parse().map_err(|_| format!("{word:?} is not a coordinate"))?;
     }
     Ok(vertex)
 }
@@ -56,9 +50,7 @@ fn vertex<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<Point3<f64>, S
 /// The vertex of `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from zero.
 fn corner(word: &str, vertex_count: usize) -> Result<usize, String> {
     let index = word.split('/').next().unwrap_or(word);
-    let number: i64 = index
-        .parse()
-        .map_err(|_| format!("{word:?} is not a corner"))?;
+    let number: i64 = index.parse().map_err(|_| format!("{word:?} is not a corner"))?;
     let vertex = match usize::try_from(number.unsigned_abs()) {
         Ok(magnitude) if number > 0 => Some(magnitude - 1),
         Ok(magnitude) if number < 0 => vertex_count.checked_sub(magnitude),

@@ -39,9 +39,7 @@ impl PropertyAccess for Element {
 pub(super) fn read(bytes: &[u8]) -> Result<Polygons, MeshFileError> {
     let mut reader = Reader::new(bytes);
     let parser = Parser::<Element>::new();
-    let header = parser
-        .read_header(&mut reader)
-        .map_err(|error| malformed(error.to_string()))?;
+    let header = parser.read_header(&mut reader).map_err(|error| malformed(error.to_string()))?;
     let mut polygons = Polygons::default();
     for (name, definition) in &header.elements {
         let (what, limit) = match name.as_str() {
@@ -52,11 +50,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Polygons, MeshFileError> {
         within(what, definition.count, limit)?;
         // No element with a property takes less than a byte, and one without would be read for ever from nothing.
         if definition.count > bytes.len() || definition.properties.is_empty() {
-            return Err(malformed(format!(
-                "{} {what} do not fit into {} bytes",
-                definition.count,
-                bytes.len()
-            )));
+            return Err(malformed(format!("{} {what} do not fit into {} bytes", definition.count, bytes.len())));
         }
         let elements = parser
             .read_payload_for_element(&mut reader, definition, &header)
@@ -73,10 +67,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Polygons, MeshFileError> {
 }
 
 fn malformed(reason: String) -> MeshFileError {
-    MeshFileError::Malformed {
-        format: MeshFormat::Ply,
-        reason,
-    }
+    MeshFileError::Malformed { format: MeshFormat::Ply, reason }
 }
 
 fn vertex(index: usize, element: &Element) -> Result<Point3<f64>, MeshFileError> {
@@ -90,14 +81,10 @@ fn face(index: usize, element: &Element) -> Result<Vec<usize>, MeshFileError> {
     let corners = element.corners.as_ref();
     let corners = corners.ok_or_else(|| malformed(format!("face {index} lacks vertex_indices")))?;
     if corners.len() < 3 {
-        return Err(malformed(format!(
-            "face {index} has {} corners",
-            corners.len()
-        )));
+        return Err(malformed(format!("face {index} has {} corners", corners.len())));
     }
     let vertex = |&corner: &i64| {
-        usize::try_from(corner)
-            .map_err(|_| malformed(format!("face {index} refers to vertex {corner}")))
+        usize::try_from(corner).map_err(|_| malformed(format!("face {index} refers to vertex {corner}")))
     };
     corners.iter().map(vertex).collect()
 }

@@ -55,9 +55,7 @@ pub enum MeshError {
         triangle: usize,
     },
     /// Two triangles run along an edge in the same direction: one of them is turned over, or more than two share the edge.
-    #[error(
-        "triangles {first} and {second} run along the edge {edge:?} in the same direction: one is turned over"
-    )]
+    #[error("triangles {first} and {second} run along the edge {edge:?} in the same direction: one is turned over")]
     InconsistentOrientation {
         /// The lower triangle.
         first: usize,
@@ -88,26 +86,17 @@ impl TriangleMesh {
                 return Err(MeshError::DuplicateVertex { first, second });
             }
         }
-        if let Some(triangle) = triangles
-            .iter()
-            .position(|corners| !has_area(&vertices, corners))
-        {
+        if let Some(triangle) = triangles.iter().position(|corners| !has_area(&vertices, corners)) {
             return Err(MeshError::NoArea { triangle });
         }
         check_orientation(&triangles)?;
-        Ok(Self {
-            vertices,
-            triangles,
-        })
+        Ok(Self { vertices, triangles })
     }
 
     /// Like [`new`](Self::new), but merges vertices of equal coordinates into the first of them and drops triangles without area.
     ///
     /// Vertices keep their order and are renumbered where one before them was merged.
-    pub fn welded(
-        vertices: Vec<Point3<f64>>,
-        triangles: Vec<[usize; 3]>,
-    ) -> Result<Self, MeshError> {
+    pub fn welded(vertices: Vec<Point3<f64>>, triangles: Vec<[usize; 3]>) -> Result<Self, MeshError> {
         check_vertices(&vertices)?;
         check_indices(&triangles, vertices.len())?;
         let (mut seen, mut kept) = (BTreeMap::new(), Vec::new());
@@ -120,12 +109,8 @@ impl TriangleMesh {
                 })
             })
             .collect();
-        let triangles = triangles
-            .into_iter()
-            .map(|corners| corners.map(|corner| renumbered[corner]));
-        let triangles = triangles
-            .filter(|corners| has_area(&kept, corners))
-            .collect();
+        let triangles = triangles.into_iter().map(|corners| corners.map(|corner| renumbered[corner]));
+        let triangles = triangles.filter(|corners| has_area(&kept, corners)).collect();
         Self::new(kept, triangles)
     }
 
@@ -147,16 +132,9 @@ pub fn doubled_area_normal(vertices: &[Point3<f64>], corners: &[usize; 3]) -> Ve
 }
 
 fn check_vertices(vertices: &[Point3<f64>]) -> Result<(), MeshError> {
-    let allowed = |vertex: &Point3<f64>| {
-        vertex
-            .iter()
-            .all(|coordinate| coordinate.abs() <= COORDINATE_LIMIT_MM)
-    };
+    let allowed = |vertex: &Point3<f64>| vertex.iter().all(|coordinate| coordinate.abs() <= COORDINATE_LIMIT_MM);
     match vertices.iter().position(|vertex| !allowed(vertex)) {
-        Some(vertex) => Err(MeshError::Vertex {
-            vertex,
-            position: vertices[vertex].coords.into(),
-        }),
+        Some(vertex) => Err(MeshError::Vertex { vertex, position: vertices[vertex].coords.into() }),
         None => Ok(()),
     }
 }
@@ -164,11 +142,7 @@ fn check_vertices(vertices: &[Point3<f64>]) -> Result<(), MeshError> {
 fn check_indices(triangles: &[[usize; 3]], vertex_count: usize) -> Result<(), MeshError> {
     for (triangle, corners) in triangles.iter().enumerate() {
         if let Some(&vertex) = corners.iter().find(|&&corner| corner >= vertex_count) {
-            return Err(MeshError::IndexOutOfRange {
-                triangle,
-                vertex,
-                vertex_count,
-            });
+            return Err(MeshError::IndexOutOfRange { triangle, vertex, vertex_count });
         }
     }
     Ok(())
@@ -183,11 +157,7 @@ fn check_orientation(triangles: &[[usize; 3]]) -> Result<(), MeshError> {
     match directed.windows(2).find(|pair| pair[0].0 == pair[1].0) {
         Some(pair) => {
             let (edge, first, second) = (pair[0].0, pair[0].1, pair[1].1);
-            Err(MeshError::InconsistentOrientation {
-                first,
-                second,
-                edge,
-            })
+            Err(MeshError::InconsistentOrientation { first, second, edge })
         }
         None => Ok(()),
     }
@@ -195,10 +165,7 @@ fn check_orientation(triangles: &[[usize; 3]]) -> Result<(), MeshError> {
 
 fn has_area(vertices: &[Point3<f64>], corners: &[usize; 3]) -> bool {
     let [a, b, c] = corners.map(|corner| vertices[corner]);
-    let longest_squared = (b - a)
-        .norm_squared()
-        .max((c - b).norm_squared())
-        .max((a - c).norm_squared());
+    let longest_squared = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
     doubled_area_normal(vertices, corners).norm() > LEAST_ASPECT * longest_squared
 }
 

@@ -30,37 +30,16 @@ impl LayerRanges {
 }
 
 const fn thickness(default: f64, min: f64, max: f64, source: &'static str) -> ParameterRange {
-    ParameterRange {
-        name: "thickness",
-        unit: "mm",
-        default,
-        min,
-        max,
-        source,
-    }
+    ParameterRange { name: "thickness", unit: "mm", default, min, max, source }
 }
 
 const fn youngs_modulus(default: f64, min: f64, max: f64, source: &'static str) -> ParameterRange {
-    ParameterRange {
-        name: "Young's modulus",
-        unit: "kPa",
-        default,
-        min,
-        max,
-        source,
-    }
+    ParameterRange { name: "Young's modulus", unit: "kPa", default, min, max, source }
 }
 
 /// Nearly incompressible up to the limit that the elements are verified for.
 const fn poisson_ratio(default: f64, source: &'static str) -> ParameterRange {
-    ParameterRange {
-        name: "Poisson's ratio",
-        unit: "1",
-        default,
-        min: 0.0,
-        max: 0.4999,
-        source,
-    }
+    ParameterRange { name: "Poisson's ratio", unit: "1", default, min: 0.0, max: 0.4999, source }
 }
 
 /// The retina as a whole.
@@ -105,12 +84,7 @@ pub const RETINA_SUBLAYER: LayerRanges = LayerRanges {
 
 /// Choroid with Bruch's membrane and pigment epithelium, in the transverse direction and drained.
 pub const CHOROID: LayerRanges = LayerRanges {
-    thickness: thickness(
-        0.25,
-        0.05,
-        0.5,
-        "[unverified] about 0.25-0.3 mm under the fovea in vivo",
-    ),
+    thickness: thickness(0.25, 0.05, 0.5, "[unverified] about 0.25-0.3 mm under the fovea in vivo"),
     youngs_modulus: youngs_modulus(
         6.0,
         1.0,
@@ -118,10 +92,7 @@ pub const CHOROID: LayerRanges = LayerRanges {
         "[unverified] drained transverse modulus: blood leaves a choroid that is pressed. In the plane, strips of the choroid \
          complex have 0.60 +/- 0.28 MPa (Friberg & Lace 1988), which the bounds include",
     ),
-    poisson_ratio: poisson_ratio(
-        0.2,
-        "[unverified] drained: its volume changes as blood leaves it",
-    ),
+    poisson_ratio: poisson_ratio(0.2, "[unverified] drained: its volume changes as blood leaves it"),
 };
 
 /// Sclera.

@@ -29,14 +29,8 @@ fn paraboloid_by_midpoints(bed: &LayeredBed, radius: f64, a: f64) -> (f64, f64) 
         .map(|(k, step)| (k, (surface_compliance_real(bed, k).normal - c) * step))
         .collect();
     let width = a / N as f64;
-    let kernel: Vec<f64> = (0..2 * N)
-        .map(|i| {
-            spectrum
-                .iter()
-                .map(|(k, d)| d * (k * width * i as f64).cos())
-                .sum()
-        })
-        .collect();
+    let kernel: Vec<f64> =
+        (0..2 * N).map(|i| spectrum.iter().map(|(k, d)| d * (k * width * i as f64).cos()).sum()).collect();
     let matrix = DMatrix::from_fn(N, N, |i, j| {
         let identity = if i == j { FRAC_PI_2 * c } else { 0.0 };
         identity + 0.5 * width * (kernel[i.abs_diff(j)] + kernel[i + j + 1])
@@ -44,9 +38,7 @@ fn paraboloid_by_midpoints(bed: &LayeredBed, radius: f64, a: f64) -> (f64, f64) 
     let at = |i: usize| width * (i as f64 + 0.5);
     let lu = matrix.lu();
     let flat = lu.solve(&DVector::from_element(N, 1.0)).expect("regular");
-    let bowl = lu
-        .solve(&DVector::from_fn(N, |i, _| at(i) * at(i) / radius))
-        .expect("regular");
+    let bowl = lu.solve(&DVector::from_fn(N, |i, _| at(i) * at(i) / radius)).expect("regular");
     let edge = |v: &DVector<f64>| 1.875 * v[N - 1] - 1.25 * v[N - 2] + 0.375 * v[N - 3];
     let depth = edge(&bowl) / edge(&flat);
     (TAU * width * (flat.sum() * depth - bowl.sum()), depth)
@@ -54,35 +46,14 @@ fn paraboloid_by_midpoints(bed: &LayeredBed, radius: f64, a: f64) -> (f64, f64) 
 
 #[test]
 fn paraboloid_on_layers() {
-    for bed in [
-        single(20.0, 0.4999, 0.25),
-        single(20.0, 0.49, 0.08),
-        eye_wall(),
-    ] {
+    for bed in [single(20.0, 0.4999, 0.25), single(20.0, 0.49, 0.08), eye_wall()] {
         let ready = prepare(&bed);
-        for (radius, a) in [
-            (0.05, 0.02),
-            (0.05, 0.1),
-            (0.2, 0.1),
-            (0.2, 0.25),
-            (1.0, 0.5),
-        ] {
+        for (radius, a) in [(0.05, 0.02), (0.05, 0.1), (0.2, 0.1), (0.2, 0.25), (1.0, 0.5)] {
             let (force, depth) = paraboloid_by_midpoints(&bed, radius, a);
             let heights = heights(&ready, |r| r * r / (2.0 * radius));
-            let got = ready
-                .indent_by_force(&smooth(&heights), force)
-                .expect("contact");
-            let tolerance = if a > 3.0 * bed.layers[0].thickness_mm {
-                WIDE_CONTACT
-            } else {
-                CONTACT
-            };
-            close(
-                &format!("depth R {radius} a {a}"),
-                got.depth_mm,
-                depth,
-                tolerance,
-            );
+            let got = ready.indent_by_force(&smooth(&heights), force).expect("contact");
+            let tolerance = if a > 3.0 * bed.layers[0].thickness_mm { WIDE_CONTACT } else { CONTACT };
+            close(&format!("depth R {radius} a {a}"), got.depth_mm, depth, tolerance);
             close("contact radius", got.contact_radius_mm, a, 3.0 * tolerance);
         }
     }
@@ -92,15 +63,8 @@ fn paraboloid_on_layers() {
     for a in [0.01, 0.05, 0.1] {
         let (force, depth) = paraboloid_by_midpoints(&bed, 0.2, a);
         let heights = heights(&ready, |r| r * r / 0.4);
-        let got = ready
-            .indent_by_force(&smooth(&heights), force)
-            .expect("contact");
-        close(
-            &format!("depth on a membrane, a {a}"),
-            got.depth_mm,
-            depth,
-            WIDE_CONTACT,
-        );
+        let got = ready.indent_by_force(&smooth(&heights), force).expect("contact");
+        close(&format!("depth on a membrane, a {a}"), got.depth_mm, depth, WIDE_CONTACT);
     }
 }
 
@@ -111,25 +75,11 @@ fn hertz_sphere() {
     let heights = heights(&bed, |r| r * r / 0.1);
     let modulus = 20.0 / (1.0 - 0.49 * 0.49);
     for depth in [0.001, 0.0033, 0.01, 0.025, 0.05] {
-        let got = bed
-            .indent_by_depth(&smooth(&heights), depth)
-            .expect("contact");
+        let got = bed.indent_by_depth(&smooth(&heights), depth).expect("contact");
         let want = 4.0 / 3.0 * modulus * f64::sqrt(0.05) * f64::powf(depth, 1.5);
-        close(
-            &format!("Hertz force at {depth}"),
-            got.normal_force_mn,
-            want,
-            CONTACT,
-        );
-        close(
-            "Hertz radius",
-            got.contact_radius_mm,
-            f64::sqrt(0.05 * depth),
-            1e-2,
-        );
-        let back = bed
-            .indent_by_force(&smooth(&heights), got.normal_force_mn)
-            .expect("contact");
+        close(&format!("Hertz force at {depth}"), got.normal_force_mn, want, CONTACT);
+        close("Hertz radius", got.contact_radius_mm, f64::sqrt(0.05 * depth), 1e-2);
+        let back = bed.indent_by_force(&smooth(&heights), got.normal_force_mn).expect("contact");
         close("depth of the force of a depth", back.depth_mm, depth, 1e-9);
     }
 }
@@ -140,16 +90,9 @@ fn cone() {
     let bed = prepare(&single(20.0, 0.3, HALF_SPACE_MM));
     let heights = heights(&bed, |r| r / 2.0);
     for depth in [0.01, 0.05, 0.2] {
-        let got = bed
-            .indent_by_depth(&smooth(&heights), depth)
-            .expect("contact");
+        let got = bed.indent_by_depth(&smooth(&heights), depth).expect("contact");
         let want = 2.0 / PI * 20.0 / 0.91 * 2.0 * depth * depth;
-        close(
-            &format!("cone at {depth}"),
-            got.normal_force_mn,
-            want,
-            CONTACT,
-        );
+        close(&format!("cone at {depth}"), got.normal_force_mn, want, CONTACT);
     }
 }
 
@@ -161,41 +104,20 @@ fn flat_punch() {
     let modulus = e / (1.0 - nu * nu);
     for radius in [0.05, 0.25, 0.3205] {
         let heights = heights(&bed, |r| if r <= radius { 0.0 } else { f64::INFINITY });
-        let edge = Some(ProfileEdge {
-            radius_mm: radius,
-            height_mm: 0.0,
-        });
-        let got = bed
-            .indent_by_force(
-                &RigidProfile {
-                    heights_mm: &heights,
-                    edge,
-                },
-                1.0,
-            )
-            .expect("contact");
+        let edge = Some(ProfileEdge { radius_mm: radius, height_mm: 0.0 });
+        let got = bed.indent_by_force(&RigidProfile { heights_mm: &heights, edge }, 1.0).expect("contact");
         let depth = 1.0 / (2.0 * radius * modulus);
         close(&format!("punch {radius}"), got.depth_mm, depth, PUNCH);
         assert_eq!(got.contact_radius_mm, radius);
         let response = bed.surface_response(&got);
         for ratio in [1.001, 1.02, 1.3, 3.0] {
             let (_, uz) = response.displacement(ratio * radius);
-            close(
-                "outside the punch",
-                uz,
-                -2.0 * depth / PI * f64::asin(1.0 / ratio),
-                PUNCH * (1.0 + ratio),
-            );
+            close("outside the punch", uz, -2.0 * depth / PI * f64::asin(1.0 / ratio), PUNCH * (1.0 + ratio));
         }
         let r = 0.7 * radius;
         let slope = (1.0 - 2.0 * nu) * (1.0 + nu) / e / (TAU * radius);
         let want = -slope * (radius - (radius * radius - r * r).sqrt()) / r;
-        close(
-            "radial under the punch",
-            response.displacement(r).0,
-            want,
-            PUNCH,
-        );
+        close("radial under the punch", response.displacement(r).0, want, PUNCH);
     }
 }
 
@@ -203,19 +125,12 @@ fn flat_punch() {
 fn boussinesq_far_field() {
     let bed = prepare(&single(20.0, 0.49, HALF_SPACE_MM));
     let heights = heights(&bed, |r| r * r / 0.02);
-    let got = bed
-        .indent_by_force(&smooth(&heights), 0.01)
-        .expect("contact");
+    let got = bed.indent_by_force(&smooth(&heights), 0.01).expect("contact");
     let response = bed.surface_response(&got);
     // From 1 mm (25 contact radii: a²/6r² = 3e-4 is left) to beyond the tables' end at 4 mm, less 3/4 r/h of the finite bed.
     for r in [1.0, 2.0, 3.9, 8.0] {
         let want = -0.01 * (1.0 - 0.49 * 0.49) / (PI * 20.0 * r);
-        close(
-            &format!("Boussinesq at {r}"),
-            response.displacement(r).1,
-            want,
-            5e-4 + r / HALF_SPACE_MM,
-        );
+        close(&format!("Boussinesq at {r}"), response.displacement(r).1, want, 5e-4 + r / HALF_SPACE_MM);
     }
 }
 
@@ -225,20 +140,8 @@ fn thin_bonded_layer() {
     // The series leaves the integral equation's solution (paraboloid_on_layers, within 1e-4 of ours) by about 0.3 χ².
     let bed = prepare(&single(20.0, 0.4999, 0.25));
     let heights = heights(&bed, |r| r * r / 0.1);
-    for (depth, force) in [
-        (0.005, 0.003027),
-        (0.01, 0.008842),
-        (0.025, 0.037339),
-        (0.05, 0.114154),
-    ] {
-        let got = bed
-            .indent_by_depth(&smooth(&heights), depth)
-            .expect("contact");
-        close(
-            &format!("Dimitriadis at {depth}"),
-            got.normal_force_mn,
-            force,
-            0.3 * 0.05 * depth / 0.0625,
-        );
+    for (depth, force) in [(0.005, 0.003027), (0.01, 0.008842), (0.025, 0.037339), (0.05, 0.114154)] {
+        let got = bed.indent_by_depth(&smooth(&heights), depth).expect("contact");
+        close(&format!("Dimitriadis at {depth}"), got.normal_force_mn, force, 0.3 * 0.05 * depth / 0.0625);
     }
 }

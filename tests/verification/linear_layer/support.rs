@@ -23,15 +23,8 @@ pub const HALF_SPACE_MM: f64 = 1e5;
 pub const PUNCH: f64 = 1e-3;
 
 pub fn single(e: f64, nu: f64, h: f64) -> LayeredBed {
-    let layer = BedLayer {
-        thickness_mm: h,
-        youngs_modulus_kpa: e,
-        poisson_ratio: nu,
-    };
-    LayeredBed {
-        layers: vec![layer],
-        base: BedBase::Bonded,
-    }
+    let layer = BedLayer { thickness_mm: h, youngs_modulus_kpa: e, poisson_ratio: nu };
+    LayeredBed { layers: vec![layer], base: BedBase::Bonded }
 }
 
 pub fn prepare(bed: &LayeredBed) -> LinearBed {
@@ -43,34 +36,21 @@ pub fn heights(bed: &LinearBed, f: impl Fn(f64) -> f64) -> Vec<f64> {
 }
 
 pub fn smooth(heights_mm: &[f64]) -> RigidProfile<'_> {
-    RigidProfile {
-        heights_mm,
-        edge: None,
-    }
+    RigidProfile { heights_mm, edge: None }
 }
 
 #[track_caller]
 pub fn close(name: &str, got: f64, want: f64, tolerance: f64) {
     let error = (got - want).abs() / want.abs();
     println!("{name}: {got:.6e} wanted {want:.6e} relative error {error:.2e}");
-    assert!(
-        error <= tolerance,
-        "{name}: {got} wanted {want}, relative error {error:e} > {tolerance:e}"
-    );
+    assert!(error <= tolerance, "{name}: {got} wanted {want}, relative error {error:e} > {tolerance:e}");
 }
 
 pub fn eye_wall() -> LayeredBed {
-    let layer = |thickness_mm, youngs_modulus_kpa, poisson_ratio| BedLayer {
-        thickness_mm,
-        youngs_modulus_kpa,
-        poisson_ratio,
-    };
+    let layer =
+        |thickness_mm, youngs_modulus_kpa, poisson_ratio| BedLayer { thickness_mm, youngs_modulus_kpa, poisson_ratio };
     LayeredBed {
-        layers: vec![
-            layer(0.25, 20.0, 0.49),
-            layer(0.3, 6.0, 0.3),
-            layer(0.6, 2000.0, 0.45),
-        ],
+        layers: vec![layer(0.25, 20.0, 0.49), layer(0.3, 6.0, 0.3), layer(0.6, 2000.0, 0.45)],
         base: BedBase::Bonded,
     }
 }
@@ -78,13 +58,6 @@ pub fn eye_wall() -> LayeredBed {
 /// A membrane of 1 µm, a thousand times as stiff, on the retina.
 pub fn membrane_wall() -> LayeredBed {
     let mut bed = eye_wall();
-    bed.layers.insert(
-        0,
-        BedLayer {
-            thickness_mm: 0.001,
-            youngs_modulus_kpa: 20_000.0,
-            poisson_ratio: 0.45,
-        },
-    );
+    bed.layers.insert(0, BedLayer { thickness_mm: 0.001, youngs_modulus_kpa: 20_000.0, poisson_ratio: 0.45 });
     bed
 }

@@ -1,0 +1,124 @@
+//! Measures every level on random requests of the working range in one run: time, error against `reference`, failures.
+//!
+//! `cargo run --release -p retina-tests --bin levels [-- REQUESTS [SEED]]` prints the table that the README shows. One core, one
+//! thread; times are those of a whole prediction, the scene prepared and the workspace warm.
+
+use std::time::Instant;
+
+use retina_core::predict::{Level, PredictError, Prediction, PreparedScene, Workspace};
+use retina_core::progress::Silent;
+use retina_core::scene::Scene;
+use retina_tests::statistics::{node_errors_um, quantile, root_mean_square};
+use retina_tests::working_range::WorkingRange;
+
+/// Requests per run unless told.
+const REQUESTS: usize = 100;
+
+#[derive(Default)]
+struct Column {
+    milliseconds: Vec<f64>,
+    errors_um: Vec<f64>,
+    worst_um: Vec<f64>,
+    squared_um2: f64,
+    iterations: Vec<f64>,
+    failures: Vec<String>,
+}
+
+fn main() -> Result<(), PredictError> {
+    let mut arguments = std::env::args().skip(1);
+    let requests = arguments.next().and_then(|a| a.parse().ok()).unwrap_or(REQUESTS);
+    let seed = arguments.next().and_then(|a| a.parse().ok()).unwrap_or(1_u64);
+    let scenes: Vec<PreparedScene> = Scene::built_in_names()
+        .iter()
+        .filter_map(|name| Scene::built_in(name))
+        .map(PreparedScene::new)
+        .collect::<Result<_, _>>()?;
+    let mut ranges: Vec<WorkingRange> =
+        scenes.iter().zip(seed..).map(|(s, seed)| WorkingRange::new(&s.scene().tissue, seed)).collect();
+    let mut workspace = Workspace::default();
+    let mut columns: [Column; 3] = Default::default();
+    let (mut motion_um, mut moved) = (0.0, Vec::new());
+    for index in 0..requests {
+        let which = index % scenes.len();
+        let mut request = ranges[which].request(Level::Reference);
+        let mut answers: [Option<Prediction>; 3] = Default::default();
+        for (at, level) in Level::ALL.into_iter().enumerate() {
+            request.level = level;
+            // Once for the caches, once for the clock; the slow level needs no warm-up.
+            if level != Level::Reference {
+                let _ = scenes[which].predict(&request, &mut workspace, &mut Silent);
+            }
+            let start = Instant::now();
+            let answer = scenes[which].predict(&request, &mut workspace, &mut Silent);
+            let milliseconds = start.elapsed().as_secs_f64() * 1e3;
+            match answer {
+                Ok(answer) => {
+                    columns[at].milliseconds.push(milliseconds);
+                    columns[at].iterations.push(answer.solver.iterations as f64);
+                    answers[at] = Some(answer);
+                }
+                Err(error) => columns[at].failures.push(format!("{}: {error}", scenes[which].scene().name)),
+            }
+        }
+        let Some(truth) = &answers[2] else { continue };
+        let motion = &truth.displacement_um;
+        motion_um += motion.iter().map(|u| u * u).sum::<f64>();
+        moved.push(motion.iter().copied().fold(0.0, f64::max));
+        for (column, answer) in columns.iter_mut().zip(&answers) {
+            let Some(answer) = answer else { continue };
+            let errors = node_errors_um(&answer.vertices, &truth.vertices);
+            column.squared_um2 += errors.iter().map(|e| e * e).sum::<f64>();
+            column.worst_um.push(errors.iter().copied().fold(0.0, f64::max));
+            column.errors_um.extend(errors);
+        }
+        eprintln!(
+            "{index} {} {:?} {:?} F {:.3} ref {:?} its {} max u {:.0} worst lin {:.1} coarse {:.1}",
+            scenes[which].scene().name,
+            request.needle.shape.tip,
+            request.needle.shape.radius_mm,
+            match request.control {
+                retina_core::predict::Control::Force(f) => f.norm(),
+                _ => 0.0,
+            },
+            columns[2].milliseconds.last(),
+            columns[2].iterations.last().unwrap(),
+            moved.last().unwrap(),
+            columns[0].worst_um.last().unwrap_or(&0.0),
+            columns[1].worst_um.last().unwrap_or(&0.0)
+        );
+    }
+    eprintln!();
+    println!(
+        "{requests} requests, seed {seed}; largest displacement per request: median {:.1} µm, p95 {:.1} µm",
+        quantile(&moved, 0.5),
+        quantile(&moved, 0.95)
+    );
+    println!(
+        "| level | median ms | p99 ms | MAE µm | p99 node µm | worst node: median / max µm | % of RMS displacement | Newton median / p99 | failed |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for (level, column) in Level::ALL.iter().zip(&columns) {
+        let errors = &column.errors_um;
+        println!(
+            "| `{}` | {:.3} | {:.3} | {:.2} | {:.2} | {:.2} / {:.2} | {:.1} | {:.0} / {:.0} | {} |",
+            level.name(),
+            quantile(&column.milliseconds, 0.5),
+            quantile(&column.milliseconds, 0.99),
+            errors.iter().sum::<f64>() / errors.len() as f64,
+            quantile(errors, 0.99),
+            quantile(&column.worst_um, 0.5),
+            quantile(&column.worst_um, 1.0),
+            100.0 * (column.squared_um2 / motion_um).sqrt(),
+            quantile(&column.iterations, 0.5),
+            quantile(&column.iterations, 0.99),
+            column.failures.len()
+        );
+    }
+    for column in &columns {
+        for failure in &column.failures {
+            println!("- failed: {failure}");
+        }
+    }
+    let _ = root_mean_square(&moved);
+    Ok(())
+}
