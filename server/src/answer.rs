@@ -41,9 +41,7 @@ pub fn predict(
     stopwatch: &mut Stopwatch,
     layout: Layout,
 ) -> Result<Vec<u8>, Problem> {
-    let prediction = scene
-        .predict(request, workspace, stopwatch)
-        .map_err(from_predict)?;
+    let prediction = scene.predict(request, workspace, stopwatch).map_err(from_predict)?;
     let response = PredictResponse::new(&prediction, stopwatch.finish());
     write(&response, layout).map_err(Problem::internal)
 }

@@ -46,16 +46,10 @@ impl AsRef<[u8]> for Received {
 /// # Errors
 /// [`Kind::UnsupportedMediaType`], [`Kind::BodyTooLarge`], [`Kind::RequestTimeout`], [`Kind::Busy`] for a large body too many, or
 /// [`Kind::MalformedJson`] for one that breaks off.
-pub async fn json(
-    headers: &HeaderMap,
-    body: Body,
-    large: &Arc<Semaphore>,
-) -> Result<Received, Problem> {
+pub async fn json(headers: &HeaderMap, body: Body, large: &Arc<Semaphore>) -> Result<Received, Problem> {
     let given = headers.get(header::CONTENT_TYPE);
     if !given.is_some_and(|value| value.to_str().is_ok_and(is_json)) {
-        let given = given.map_or("none".into(), |value| {
-            String::from_utf8_lossy(value.as_bytes())
-        });
+        let given = given.map_or("none".into(), |value| String::from_utf8_lossy(value.as_bytes()));
         let detail = format!("The request's Content-Type is {given}; it must be application/json.");
         return Err(Problem::new(Kind::UnsupportedMediaType, detail));
     }
@@ -63,24 +57,15 @@ pub async fn json(
         Ok(result) => result,
         Err(_) => Err(Problem::new(
             Kind::RequestTimeout,
-            format!(
-                "The body did not arrive within {} seconds.",
-                PATIENCE.as_secs()
-            ),
+            format!("The body did not arrive within {} seconds.", PATIENCE.as_secs()),
         )),
     }
 }
 
 /// `application/json` or `application/…+json`, with or without parameters.
 fn is_json(media_type: &str) -> bool {
-    let essence = media_type
-        .split(';')
-        .next()
-        .unwrap_or_default()
-        .trim()
-        .to_ascii_lowercase();
-    essence == "application/json"
-        || (essence.starts_with("application/") && essence.ends_with("+json"))
+    let essence = media_type.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
+    essence == "application/json" || (essence.starts_with("application/") && essence.ends_with("+json"))
 }
 
 async fn collect(mut body: Body, large: &Arc<Semaphore>) -> Result<Received, Problem> {
@@ -89,12 +74,8 @@ async fn collect(mut body: Body, large: &Arc<Semaphore>) -> Result<Received, Pro
     let mut length = 0;
     let mut permit = None;
     while let Some(frame) = body.frame().await {
-        let frame = frame.map_err(|error| {
-            Problem::new(
-                Kind::MalformedJson,
-                format!("The body breaks off: {error}."),
-            )
-        })?;
+        let frame =
+            frame.map_err(|error| Problem::new(Kind::MalformedJson, format!("The body breaks off: {error}.")))?;
         let Ok(data) = frame.into_data() else {
             continue;
         };
@@ -104,12 +85,10 @@ async fn collect(mut body: Body, large: &Arc<Semaphore>) -> Result<Received, Pro
         }
         if length >= LARGE_BYTES && permit.is_none() {
             let free = Arc::clone(large).try_acquire_owned();
-            permit = Some(free.map_err(|_| {
-                Problem::new(
-                    Kind::Busy,
-                    "Too many large bodies are at work; try again in a second.",
-                )
-            })?);
+            permit =
+                Some(free.map_err(|_| {
+                    Problem::new(Kind::Busy, "Too many large bodies are at work; try again in a second.")
+                })?);
         }
         if length > LIMIT_BYTES {
             (first, joined) = (Bytes::new(), Vec::new());
@@ -127,12 +106,5 @@ async fn collect(mut body: Body, large: &Arc<Semaphore>) -> Result<Received, Pro
         let detail = format!("The body has more than {LIMIT_BYTES} bytes.");
         return Err(Problem::new(Kind::BodyTooLarge, detail));
     }
-    Ok(Received {
-        bytes: if joined.is_empty() {
-            first
-        } else {
-            joined.into()
-        },
-        _large: permit,
-    })
+    Ok(Received { bytes: if joined.is_empty() { first } else { joined.into() }, _large: permit })
 }

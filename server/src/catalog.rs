@@ -7,9 +7,7 @@ use retina_core::predict::Level;
 use retina_core::range::ParameterRange;
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
-use retina_core::tissue::ranges::{
-    CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA,
-};
+use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA};
 use retina_core::tissue::{Layer, Tissue};
 
 use crate::understand::{DEFAULT_GAUGE, DEFAULT_LEVEL, DEFAULT_SCENE, FORCE};
@@ -20,12 +18,7 @@ use crate::wire::scene::{LayerSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceS
 
 /// The built-in scenes, and every parameter with its range.
 pub fn scenes() -> SceneList {
-    let entry = |&name: &&'static str| {
-        Some(SceneEntry {
-            name,
-            scene: spec(&Scene::built_in(name)?),
-        })
-    };
+    let entry = |&name: &&'static str| Some(SceneEntry { name, scene: spec(&Scene::built_in(name)?) });
     SceneList {
         default: DEFAULT_SCENE,
         scenes: Scene::built_in_names().iter().filter_map(entry).collect(),
@@ -42,26 +35,15 @@ pub fn scenes() -> SceneList {
 pub fn levels() -> LevelList {
     let entry = |level: Level| {
         let (what, cost) = match level {
-            Level::Linear => (
-                "layered linear elasticity and a contact law, prepared once per scene",
-                "tens of microseconds",
-            ),
-            Level::Coarse => (
-                "finite elements on a mesh that fits in milliseconds",
-                "milliseconds",
-            ),
+            Level::Linear => {
+                ("layered linear elasticity and a contact law, prepared once per scene", "tens of microseconds")
+            }
+            Level::Coarse => ("finite elements on a mesh that fits in milliseconds", "milliseconds"),
             Level::Reference => ("finite elements on the converged mesh", "seconds"),
         };
-        LevelEntry {
-            name: level.name(),
-            what,
-            cost,
-        }
+        LevelEntry { name: level.name(), what, cost }
     };
-    LevelList {
-        default: DEFAULT_LEVEL.name(),
-        levels: Level::ALL.map(entry).into(),
-    }
+    LevelList { default: DEFAULT_LEVEL.name(), levels: Level::ALL.map(entry).into() }
 }
 
 /// The gauges, thin to thick.
@@ -71,10 +53,7 @@ pub fn gauges() -> GaugeList {
         outer_diameter_mm: gauge.outer_diameter_mm,
         source: gauge.source,
     });
-    GaugeList {
-        default: DEFAULT_GAUGE,
-        gauges: gauges.into(),
-    }
+    GaugeList { default: DEFAULT_GAUGE, gauges: gauges.into() }
 }
 
 /// A scene as a request would write it out.
@@ -94,21 +73,13 @@ fn spec(scene: &Scene) -> SceneSpec {
         SceneSurface::Sphere { radius_mm } => {
             (surface.kind, surface.radius_mm) = (SurfaceKind::Sphere, Some(radius_mm));
         }
-        SceneSurface::FovealPit {
-            radius_mm,
-            depth_mm,
-            sigma_mm,
-        } => {
+        SceneSurface::FovealPit { radius_mm, depth_mm, sigma_mm } => {
             (surface.kind, surface.radius_mm) = (SurfaceKind::FovealPit, Some(radius_mm));
             (surface.depth_mm, surface.sigma_mm) = (Some(depth_mm), Some(sigma_mm));
         }
         SceneSurface::Mesh(_) => surface.kind = SurfaceKind::Mesh,
     }
-    SceneSpec {
-        surface: Some(surface),
-        tissue: Some(tissue(&scene.tissue)),
-        pose: None,
-    }
+    SceneSpec { surface: Some(surface), tissue: Some(tissue(&scene.tissue)), pose: None }
 }
 
 fn tissue(tissue: &Tissue) -> TissueSpec {
@@ -149,16 +120,8 @@ fn parameters() -> Vec<ParameterEntry> {
         ("choroid", &CHOROID),
         ("sclera", &SCLERA),
     ];
-    let single = single
-        .into_iter()
-        .map(|(field, range)| parameter(field.to_owned(), range));
-    single
-        .chain(
-            layers
-                .into_iter()
-                .flat_map(|(name, ranges)| layer_parameters(name, ranges)),
-        )
-        .collect()
+    let single = single.into_iter().map(|(field, range)| parameter(field.to_owned(), range));
+    single.chain(layers.into_iter().flat_map(|(name, ranges)| layer_parameters(name, ranges))).collect()
 }
 
 fn layer_parameters(layer: &str, ranges: &LayerRanges) -> [ParameterEntry; 3] {

@@ -43,11 +43,7 @@ pub fn main() -> ExitCode {
     let CommandLine { command, config } = CommandLine::parse();
     match command {
         Some(Command::Predict(args)) => {
-            let streams = Streams {
-                input: &mut io::stdin(),
-                output: &mut io::stdout(),
-                problems: &mut io::stderr(),
-            };
+            let streams = Streams { input: &mut io::stdin(), output: &mut io::stdout(), problems: &mut io::stderr() };
             match predict_file(&args, streams) {
                 Ok(code) => ExitCode::from(code),
                 Err(_) => ExitCode::FAILURE,
@@ -89,9 +85,7 @@ async fn serve_until_ctrl_c(config: &Config) -> io::Result<()> {
 
 fn start_log(form: LogForm) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
-    let log = tracing_subscriber::fmt()
-        .with_writer(io::stderr)
-        .with_env_filter(filter);
+    let log = tracing_subscriber::fmt().with_writer(io::stderr).with_env_filter(filter);
     match form {
         LogForm::Pretty => log.with_ansi(io::stderr().is_terminal()).init(),
         LogForm::Json => log.json().init(),
@@ -147,13 +141,7 @@ fn answer(body: &[u8], mesh: Option<&Path>, layout: Layout) -> Result<Vec<u8>, P
     }
     stopwatch.stage("prepare");
     let scene = PreparedScene::new(scene).map_err(from_predict)?;
-    predict(
-        &scene,
-        &request,
-        &mut Workspace::default(),
-        &mut stopwatch,
-        layout,
-    )
+    predict(&scene, &request, &mut Workspace::default(), &mut stopwatch, layout)
 }
 
 fn replace_surface(scene: &mut Scene, path: &Path) -> Result<(), Problem> {
@@ -165,20 +153,12 @@ fn replace_surface(scene: &mut Scene, path: &Path) -> Result<(), Problem> {
         Some("ply") => MeshFormat::Ply,
         Some("obj") => MeshFormat::Obj,
         _ => {
-            return Err(refuse(
-                "a file named .ply or .obj",
-                "unknown format".to_owned(),
-            ));
+            return Err(refuse("a file named .ply or .obj", "unknown format".to_owned()));
         }
     };
-    let bytes =
-        fs::read(path).map_err(|error| refuse("a file that can be read", error.to_string()))?;
-    let mesh = read_mesh(&bytes, format).map_err(|error| {
-        refuse(
-            "a triangle mesh in mm with a common outward side",
-            error.to_string(),
-        )
-    })?;
+    let bytes = fs::read(path).map_err(|error| refuse("a file that can be read", error.to_string()))?;
+    let mesh = read_mesh(&bytes, format)
+        .map_err(|error| refuse("a triangle mesh in mm with a common outward side", error.to_string()))?;
     scene.surface = SceneSurface::Mesh(Arc::new(mesh));
     Ok(())
 }

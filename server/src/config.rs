@@ -9,11 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// Needle pose and force in, deformed retina surface and normals out.
 #[derive(Debug, Parser)]
-#[command(
-    name = "retina-server",
-    version,
-    args_conflicts_with_subcommands = true
-)]
+#[command(name = "retina-server", version, args_conflicts_with_subcommands = true)]
 pub struct CommandLine {
     /// What to do; serve when left out.
     #[command(subcommand)]

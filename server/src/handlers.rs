@@ -29,11 +29,7 @@ use crate::wire::{GaugeList, LevelList, PredictRequest, PredictResponse, Readine
         (status = 503, description = "Too much work is waiting, or it took too long", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
     )
 )]
-pub async fn predict(
-    State(app): State<AppState>,
-    headers: HeaderMap,
-    body: Body,
-) -> Result<Response, Problem> {
+pub async fn predict(State(app): State<AppState>, headers: HeaderMap, body: Body) -> Result<Response, Problem> {
     let answer = app.answer(&headers, body).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], answer).into_response())
 }
@@ -94,17 +90,9 @@ pub async fn problem(name: Result<Path<String>, PathRejection>) -> Result<String
     let kind = Kind::ALL.iter().find(|kind| kind.name() == name);
     let kind = kind.ok_or_else(|| {
         let known: Vec<&str> = Kind::ALL.iter().map(|kind| kind.name()).collect();
-        Problem::new(
-            Kind::NotFound,
-            format!("There is no such problem; known are {}.", known.join(", ")),
-        )
+        Problem::new(Kind::NotFound, format!("There is no such problem; known are {}.", known.join(", ")))
     })?;
-    Ok(format!(
-        "{} ({})\n\n{}\n",
-        kind.title(),
-        kind.status(),
-        kind.explanation()
-    ))
+    Ok(format!("{} ({})\n\n{}\n", kind.title(), kind.status(), kind.explanation()))
 }
 
 /// A page that links to what there is.
@@ -119,10 +107,7 @@ pub async fn not_found(uri: Uri) -> Problem {
 
 /// For a method that the URL does not take; axum adds the header that lists those it does.
 pub async fn method_not_allowed(method: Method, uri: Uri) -> Problem {
-    Problem::new(
-        Kind::MethodNotAllowed,
-        format!("{} does not take {method}.", uri.path()),
-    )
+    Problem::new(Kind::MethodNotAllowed, format!("{} does not take {method}.", uri.path()))
 }
 
 /// For a handler that panicked: nothing of the panic reaches the caller.

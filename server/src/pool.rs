@@ -49,9 +49,7 @@ impl Pool {
         let mut first: Option<Job> = Some(Box::new(first));
         for index in 0..threads.max(1) {
             let (receiver, first) = (Arc::clone(&receiver), first.take());
-            thread::Builder::new()
-                .name(format!("numerics-{index}"))
-                .spawn(move || work(first, &receiver))?;
+            thread::Builder::new().name(format!("numerics-{index}")).spawn(move || work(first, &receiver))?;
         }
         Ok(Self { queue: sender })
     }

@@ -73,11 +73,7 @@ pub struct ProblemDocument<'a> {
 impl Problem {
     /// A problem that no field is at fault for.
     pub fn new(kind: Kind, detail: impl Into<String>) -> Self {
-        Self {
-            kind,
-            detail: detail.into(),
-            errors: Vec::new(),
-        }
+        Self { kind, detail: detail.into(), errors: Vec::new() }
     }
 
     /// A problem with one field.
@@ -88,25 +84,14 @@ impl Problem {
         allowed: impl Into<String>,
         detail: impl Into<String>,
     ) -> Self {
-        let error = FieldError {
-            field: field.into(),
-            value,
-            allowed: allowed.into(),
-        };
-        Self {
-            kind,
-            detail: detail.into(),
-            errors: vec![error],
-        }
+        let error = FieldError { field: field.into(), value, allowed: allowed.into() };
+        Self { kind, detail: detail.into(), errors: vec![error] }
     }
 
     /// A fault of the server: logs the cause and keeps it from the caller.
     pub fn internal(cause: impl std::fmt::Display) -> Self {
         tracing::error!(%cause, "request failed");
-        Self::new(
-            Kind::Internal,
-            "The server failed to answer; its log says why.",
-        )
+        Self::new(Kind::Internal, "The server failed to answer; its log says why.")
     }
 
     /// The document that crosses the wire.

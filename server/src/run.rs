@@ -20,19 +20,14 @@ const GRACE: Duration = Duration::from_secs(35);
 ///
 /// # Errors
 /// If the listener fails.
-pub async fn run(
-    listener: TcpListener,
-    state: AppState,
-    shutdown: CancellationToken,
-) -> io::Result<()> {
+pub async fn run(listener: TcpListener, state: AppState, shutdown: CancellationToken) -> io::Result<()> {
     // An answer is one small write that nothing should hold back.
     let listener = listener.tap_io(|connection| {
         if let Err(error) = connection.set_nodelay(true) {
             tracing::debug!(%error, "a connection without TCP_NODELAY");
         }
     });
-    let serve = axum::serve(listener, app(state))
-        .with_graceful_shutdown(shutdown.clone().cancelled_owned());
+    let serve = axum::serve(listener, app(state)).with_graceful_shutdown(shutdown.clone().cancelled_owned());
     let overdue = async {
         shutdown.cancelled().await;
         sleep(GRACE).await;

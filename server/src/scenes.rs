@@ -43,11 +43,7 @@ impl Scenes {
     /// Nothing is prepared yet; scenes of requests are kept up to `limit_bytes`.
     pub fn new(limit_bytes: usize) -> Self {
         let slot = |&name| (name, Slot::default());
-        Self {
-            built_in: Scene::built_in_names().iter().map(slot).collect(),
-            inline: Mutex::default(),
-            limit_bytes,
-        }
+        Self { built_in: Scene::built_in_names().iter().map(slot).collect(), inline: Mutex::default(), limit_bytes }
     }
 
     /// The scene that a request chooses, prepared.
@@ -88,10 +84,7 @@ impl Scenes {
             return Arc::clone(&entry.slot);
         }
         let slot = Arc::<Slot>::default();
-        let entry = Entry {
-            slot: Arc::clone(&slot),
-            last_use,
-        };
+        let entry = Entry { slot: Arc::clone(&slot), last_use };
         inline.entries.insert(key.to_vec(), entry);
         slot
     }
@@ -99,18 +92,11 @@ impl Scenes {
     /// Forgets the scene of `key` if it could not be prepared, and what is too much.
     fn tidy(&self, key: &[u8]) {
         let mut inline = lock(&self.inline);
-        if inline
-            .entries
-            .get(key)
-            .is_some_and(|entry| entry.idle_bytes() == Some(0))
-        {
+        if inline.entries.get(key).is_some_and(|entry| entry.idle_bytes() == Some(0)) {
             inline.entries.remove(key);
         }
         while inline.entries.len() > MOST_INLINE || inline.bytes() > self.limit_bytes {
-            let idle = inline
-                .entries
-                .iter()
-                .filter(|(_, entry)| entry.idle_bytes().is_some());
+            let idle = inline.entries.iter().filter(|(_, entry)| entry.idle_bytes().is_some());
             let Some((oldest, _)) = idle.min_by_key(|(_, entry)| entry.last_use) else {
                 return;
             };
@@ -127,10 +113,7 @@ impl Scenes {
 
 impl Inline {
     fn bytes(&self) -> usize {
-        self.entries
-            .iter()
-            .map(|(key, entry)| key.len() + entry.bytes())
-            .sum()
+        self.entries.iter().map(|(key, entry)| key.len() + entry.bytes()).sum()
     }
 }
 
@@ -157,10 +140,7 @@ impl Entry {
     }
 }
 
-fn fill(
-    slot: &Slot,
-    scene: impl FnOnce() -> Result<Scene, Problem>,
-) -> Result<Arc<PreparedScene>, Problem> {
+fn fill(slot: &Slot, scene: impl FnOnce() -> Result<Scene, Problem>) -> Result<Arc<PreparedScene>, Problem> {
     let mut place = lock(slot);
     if let Some(prepared) = place.as_ref() {
         return Ok(Arc::clone(prepared));
@@ -171,9 +151,7 @@ fn fill(
 }
 
 fn prepare(scene: Scene) -> Result<Arc<PreparedScene>, Problem> {
-    PreparedScene::new(scene)
-        .map(Arc::new)
-        .map_err(from_predict)
+    PreparedScene::new(scene).map(Arc::new).map_err(from_predict)
 }
 
 /// A panic while a scene was prepared leaves its place empty, which is in order.

@@ -84,10 +84,9 @@ impl App {
         };
         self.pool.run(job).await.unwrap_or_else(|error| {
             Err(match error {
-                PoolError::Full => Problem::new(
-                    Kind::Busy,
-                    "The queue of the numerical threads is full; try again in a second.",
-                ),
+                PoolError::Full => {
+                    Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
+                }
                 PoolError::Panicked => Problem::internal(error),
             })
         })
@@ -102,15 +101,9 @@ impl App {
             Some(Ok(())) => Ok(()),
             Some(Err(problem)) => Err(Problem::new(
                 Kind::NotReady,
-                format!(
-                    "The built-in scenes could not be prepared: {}",
-                    problem.detail
-                ),
+                format!("The built-in scenes could not be prepared: {}", problem.detail),
             )),
-            None => Err(Problem::new(
-                Kind::NotReady,
-                "The built-in scenes are being prepared.",
-            )),
+            None => Err(Problem::new(Kind::NotReady, "The built-in scenes are being prepared.")),
         }
     }
 }

@@ -19,13 +19,7 @@ impl<'a> Stopwatch<'a> {
     /// Starts at the end of a wait in the queue that began at `accepted`, with the stage `read`.
     pub fn start(accepted: Instant, limit: Duration, abandoned: &'a dyn Fn() -> bool) -> Self {
         let now = Instant::now();
-        Self {
-            stages: vec![("queue", now - accepted)],
-            current: "read",
-            since: now,
-            deadline: now + limit,
-            abandoned,
-        }
+        Self { stages: vec![("queue", now - accepted)], current: "read", since: now, deadline: now + limit, abandoned }
     }
 
     /// Ends the last stage; the stages so far with their times.
@@ -39,11 +33,7 @@ impl<'a> Stopwatch<'a> {
         let now = Instant::now();
         let time = now - self.since;
         self.since = now;
-        match self
-            .stages
-            .iter_mut()
-            .find(|(name, _)| *name == self.current)
-        {
+        match self.stages.iter_mut().find(|(name, _)| *name == self.current) {
             Some((_, total)) => *total += time,
             None => self.stages.push((self.current, time)),
         }

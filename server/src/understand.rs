@@ -89,21 +89,11 @@ fn level(accuracy: Option<&AccuracySpec>) -> Result<Level, Problem> {
     let Some(accuracy) = accuracy else {
         return Ok(DEFAULT_LEVEL);
     };
-    let promises = [
-        ("accuracy.max_error_um", &accuracy.max_error_um),
-        ("accuracy.max_time_ms", &accuracy.max_time_ms),
-    ];
+    let promises = [("accuracy.max_error_um", &accuracy.max_error_um), ("accuracy.max_time_ms", &accuracy.max_time_ms)];
     if let Some((field, _)) = promises.into_iter().find(|(_, given)| given.is_some()) {
-        let detail =
-            format!("{field} is not supported by this version: choose a level with accuracy.level");
+        let detail = format!("{field} is not supported by this version: choose a level with accuracy.level");
         let allowed = "left out; use accuracy.level";
-        return Err(Problem::field(
-            Kind::NotSupported,
-            field,
-            None,
-            allowed,
-            detail,
-        ));
+        return Err(Problem::field(Kind::NotSupported, field, None, allowed, detail));
     }
     let Some(name) = &accuracy.level else {
         return Ok(DEFAULT_LEVEL);
@@ -124,11 +114,7 @@ fn effects(effects: Option<&EffectsSpec>) -> Result<EffectChoice, Problem> {
         None => Ok(EffectChoice::Auto),
         Some(EffectsSpec::Word(word)) if word == "auto" => Ok(EffectChoice::Auto),
         Some(EffectsSpec::Word(word)) if word == "all" => Ok(EffectChoice::All),
-        Some(EffectsSpec::Word(word)) => Err(unknown_name(
-            "effects",
-            word,
-            &["auto", "all", "an array of names"],
-        )),
+        Some(EffectsSpec::Word(word)) => Err(unknown_name("effects", word, &["auto", "all", "an array of names"])),
         Some(EffectsSpec::Names(names)) => {
             for (index, name) in names.iter().enumerate() {
                 known(&format!("effects[{index}]"), name)?;
@@ -143,13 +129,7 @@ pub(crate) fn unknown_name(field: &str, name: &str, known: &[&str]) -> Problem {
     let shown: String = name.chars().take(60).collect();
     let allowed = known.join(", ");
     let detail = format!("{field}: there is no {shown:?}; known are {allowed}");
-    Problem::field(
-        Kind::UnknownName,
-        field,
-        Some(json!(shown)),
-        allowed,
-        detail,
-    )
+    Problem::field(Kind::UnknownName, field, Some(json!(shown)), allowed, detail)
 }
 
 /// A quaternion x, y, z, w of a length near 1, made exactly that long.
@@ -161,11 +141,5 @@ fn rotation(field: &str, xyzw: [f64; 4]) -> Result<nalgebra::UnitQuaternion<f64>
     }
     let detail = format!("{field} has the length {norm}, which is not that of a rotation");
     let allowed = format!("four numbers of length 1 within {QUATERNION_TOLERANCE}");
-    Err(Problem::field(
-        Kind::OutOfRange,
-        field,
-        Some(json!(xyzw)),
-        allowed,
-        detail,
-    ))
+    Err(Problem::field(Kind::OutOfRange, field, Some(json!(xyzw)), allowed, detail))
 }

@@ -32,10 +32,7 @@ struct Finite {
 /// For a number that is not finite.
 pub fn write(answer: &impl Serialize, layout: Layout) -> serde_json::Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(USUAL_BYTES);
-    answer.serialize(&mut Serializer::with_formatter(
-        &mut bytes,
-        Finite { layout, depth: 0 },
-    ))?;
+    answer.serialize(&mut Serializer::with_formatter(&mut bytes, Finite { layout, depth: 0 }))?;
     Ok(bytes)
 }
 

@@ -19,12 +19,7 @@ fn timeless(mut answer: Value) -> String {
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
-    value
-        .as_array()
-        .expect("array")
-        .iter()
-        .map(|number| number.as_f64().expect("number"))
-        .collect()
+    value.as_array().expect("array").iter().map(|number| number.as_f64().expect("number")).collect()
 }
 
 #[test]
@@ -33,11 +28,7 @@ fn a_press_answers_with_the_grid_and_a_balanced_needle() {
         let answer = answered(predict(&request(level)));
         assert_matches("PredictResponse", &answer);
         let surface = &answer["surface"];
-        assert_eq!(
-            surface["vertices_mm"].as_array().map(Vec::len),
-            Some(64),
-            "{level}"
-        );
+        assert_eq!(surface["vertices_mm"].as_array().map(Vec::len), Some(64), "{level}");
         assert_eq!(surface["normals"].as_array().map(Vec::len), Some(64));
         assert_eq!(surface["triangles"].as_array().map(Vec::len), Some(98));
         let moved = numbers(&surface["displacement_um"]);
@@ -45,19 +36,13 @@ fn a_press_answers_with_the_grid_and_a_balanced_needle() {
         assert!(moved.iter().any(|&um| um > 1.0), "{level}: nothing moved");
         for normal in surface["normals"].as_array().expect("array") {
             let length = numbers(normal).iter().map(|x| x * x).sum::<f64>().sqrt();
-            assert!(
-                (length - 1.0).abs() < 1e-9,
-                "{level}: normal of length {length}"
-            );
+            assert!((length - 1.0).abs() < 1e-9, "{level}: normal of length {length}");
         }
         assert_eq!(answer["contact"]["state"], "touching");
         assert_eq!(answer["accuracy"]["level"], level);
         assert!(answer["needle"]["travel_mm"].as_f64().expect("travel") > 0.0);
         let reaction = numbers(&answer["needle"]["reaction_mn"]);
-        assert!(
-            (reaction[2] - 0.4).abs() < 1e-5,
-            "{level}: reaction {reaction:?}"
-        );
+        assert!((reaction[2] - 0.4).abs() < 1e-5, "{level}: reaction {reaction:?}");
         assert_eq!(answer["surface"].get("source_indices"), None);
     }
 }
@@ -69,26 +54,16 @@ fn times_are_told_by_stage_and_add_up() {
     for name in ["queue", "read", "prepare"] {
         assert!(stages.contains_key(name), "{stages:?}");
     }
-    let sum: f64 = stages
-        .values()
-        .map(|time| time.as_f64().expect("number"))
-        .sum();
+    let sum: f64 = stages.values().map(|time| time.as_f64().expect("number")).sum();
     let total = answer["time_us"]["total"].as_f64().expect("total");
-    assert!(
-        total > 0.0 && (sum - total).abs() < 1e-6 * total,
-        "{sum} against {total}"
-    );
+    assert!(total > 0.0 && (sum - total).abs() < 1e-6 * total, "{sum} against {total}");
 }
 
 #[test]
 fn the_same_request_has_the_same_answer() {
     for level in ["linear", "coarse"] {
         let first = timeless(answered(predict(&request(level))));
-        let other = timeless(answered(predict(&with(
-            request(level),
-            "/force_mn/2",
-            json!(-0.2),
-        ))));
+        let other = timeless(answered(predict(&with(request(level), "/force_mn/2", json!(-0.2)))));
         let again = timeless(answered(predict(&request(level))));
         assert_eq!(first, again, "{level}");
         assert_ne!(first, other, "{level}: the force changes nothing");
@@ -106,11 +81,7 @@ fn defaults_are_what_they_are_said_to_be() {
         "accuracy": {"level": "coarse"},
         "effects": "auto",
     });
-    let quaternion = with(
-        short.clone(),
-        "/needle/orientation_xyzw",
-        json!([0, 0, 0, 1.0005]),
-    );
+    let quaternion = with(short.clone(), "/needle/orientation_xyzw", json!([0, 0, 0, 1.0005]));
     let radius = with(short.clone(), "/needle/radius_mm", json!(0.257));
     let expected = timeless(answered(predict(&short)));
     for request in [long, quaternion, radius] {
@@ -136,24 +107,16 @@ fn a_needle_that_stays_away_moves_nothing() {
     });
     let answer = answered(predict(&request));
     assert_eq!(answer["contact"]["state"], "clear");
-    assert!(
-        numbers(&answer["surface"]["displacement_um"])
-            .iter()
-            .all(|&um| um == 0.0)
-    );
+    assert!(numbers(&answer["surface"]["displacement_um"]).iter().all(|&um| um == 0.0));
 }
 
 /// A 13 × 13 grid of vertices 0.25 mm apart on a plane, as vertices and triangles.
 pub fn plane() -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
     let side = 13;
     let coordinate = |index: usize| 0.25 * (index as f64 - 6.0);
-    let vertices = (0..side * side)
-        .map(|i| [coordinate(i % side), coordinate(i / side), 0.0])
-        .collect();
+    let vertices = (0..side * side).map(|i| [coordinate(i % side), coordinate(i / side), 0.0]).collect();
     let squares = (0..(side - 1) * (side - 1)).map(|i| (i / (side - 1)) * side + i % (side - 1));
-    let triangles = squares
-        .flat_map(|c| [[c, c + 1, c + side + 1], [c, c + side + 1, c + side]])
-        .collect();
+    let triangles = squares.flat_map(|c| [[c, c + 1, c + side + 1], [c, c + side + 1, c + side]]).collect();
     (vertices, triangles)
 }
 
@@ -161,9 +124,7 @@ pub fn plane() -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
 pub fn plane_obj() -> String {
     let (vertices, triangles) = plane();
     let vertices = vertices.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n"));
-    let faces = triangles
-        .iter()
-        .map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
+    let faces = triangles.iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
     vertices.chain(faces).collect()
 }
 
@@ -193,10 +154,7 @@ fn a_mesh_answers_the_same_however_it_is_written() {
         let request = with(request("coarse"), "/scene", json!({"surface": surface}));
         let answer = answered(predict(&request));
         assert_matches("PredictResponse", &answer);
-        assert_eq!(
-            answer["surface"]["source_indices"].as_array().map(Vec::len),
-            Some(64)
-        );
+        assert_eq!(answer["surface"]["source_indices"].as_array().map(Vec::len), Some(64));
         timeless(answer)
     });
     assert_eq!(answers[0], answers[1]);

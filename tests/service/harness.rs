@@ -33,9 +33,7 @@ impl Reply {
 /// A service with the given arguments of its command line.
 pub fn state(arguments: &[&str]) -> AppState {
     let words = ["retina-server"].iter().chain(arguments);
-    let config = CommandLine::try_parse_from(words)
-        .expect("arguments")
-        .config;
+    let config = CommandLine::try_parse_from(words).expect("arguments").config;
     App::start(&config).expect("threads")
 }
 
@@ -111,22 +109,14 @@ pub struct Running {
 impl Running {
     /// Starts a service with these arguments and waits until it is ready.
     pub fn start(arguments: &[&str]) -> Self {
-        let listener = runtime()
-            .block_on(TcpListener::bind("127.0.0.1:0"))
-            .expect("port");
+        let listener = runtime().block_on(TcpListener::bind("127.0.0.1:0")).expect("port");
         let address = listener.local_addr().expect("address");
         let shutdown = CancellationToken::new();
         let (state, stop) = (state(arguments), shutdown.clone());
         let ended = thread::spawn(move || {
-            runtime()
-                .block_on(run(listener, state, stop))
-                .expect("service");
+            runtime().block_on(run(listener, state, stop)).expect("service");
         });
-        let running = Self {
-            address,
-            shutdown,
-            ended: Some(ended),
-        };
+        let running = Self { address, shutdown, ended: Some(ended) };
         let patience = Instant::now() + Duration::from_secs(60);
         while ureq::get(running.url("/readyz")).call().is_err() {
             assert!(Instant::now() < patience, "the service does not get ready");
@@ -161,8 +151,5 @@ impl Drop for Running {
 
 /// A client that tells of every status instead of failing for some.
 pub fn agent() -> ureq::Agent {
-    ureq::Agent::config_builder()
-        .http_status_as_error(false)
-        .build()
-        .into()
+    ureq::Agent::config_builder().http_status_as_error(false).build().into()
 }

@@ -14,18 +14,11 @@ use crate::harness::{predict, request, with};
 /// Exit code, standard output and standard error of `retina-server predict`.
 fn program(arguments: &[&str], input: &str) -> (u8, String, String) {
     let words = ["retina-server", "predict"].iter().chain(arguments);
-    let Some(Command::Predict(args)) = CommandLine::try_parse_from(words)
-        .expect("arguments")
-        .command
-    else {
+    let Some(Command::Predict(args)) = CommandLine::try_parse_from(words).expect("arguments").command else {
         panic!("not predict");
     };
     let (mut output, mut problems) = (Vec::new(), Vec::new());
-    let streams = Streams {
-        input: &mut input.as_bytes(),
-        output: &mut output,
-        problems: &mut problems,
-    };
+    let streams = Streams { input: &mut input.as_bytes(), output: &mut output, problems: &mut problems };
     let code = predict_file(&args, streams).expect("streams");
     let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
     (code, text(output), text(problems))
@@ -33,11 +26,7 @@ fn program(arguments: &[&str], input: &str) -> (u8, String, String) {
 
 fn timeless(text: &str) -> Value {
     let mut answer: Value = serde_json::from_str(text).expect("JSON");
-    answer
-        .as_object_mut()
-        .expect("object")
-        .remove("time_us")
-        .expect("time");
+    answer.as_object_mut().expect("object").remove("time_us").expect("time");
     answer
 }
 
@@ -69,11 +58,7 @@ fn the_program_answers_as_the_service_does() {
         let (code, output, problems) = program(&["-"], &request.to_string());
         assert_eq!((code, problems.as_str()), (0, ""));
         let mut served = predict(&request).body;
-        served
-            .as_object_mut()
-            .expect("object")
-            .remove("time_us")
-            .expect("time");
+        served.as_object_mut().expect("object").remove("time_us").expect("time");
         assert_eq!(timeless(&output), served, "{level}");
         let file = Scratch::new(&format!("{level}.json"), &request.to_string());
         let (_, pretty, _) = program(&[file.path(), "--pretty"], "");
@@ -96,43 +81,27 @@ fn the_program_refuses_as_the_service_does() {
 
 #[test]
 fn a_mesh_file_takes_the_place_of_the_surface() {
-    let inline = with(
-        request("coarse"),
-        "/scene",
-        json!({"surface": {"kind": "mesh", "obj": plane_obj()}}),
-    );
+    let inline = with(request("coarse"), "/scene", json!({"surface": {"kind": "mesh", "obj": plane_obj()}}));
     let mut served = predict(&inline).body;
-    served
-        .as_object_mut()
-        .expect("object")
-        .remove("time_us")
-        .expect("time");
+    served.as_object_mut().expect("object").remove("time_us").expect("time");
     for (name, text) in [("plane.obj", plane_obj()), ("plane.ply", plane_ply())] {
         let file = Scratch::new(name, &text);
-        let (code, output, problems) = program(
-            &["-", "--mesh", file.path()],
-            &request("coarse").to_string(),
-        );
+        let (code, output, problems) = program(&["-", "--mesh", file.path()], &request("coarse").to_string());
         assert_eq!(code, 0, "{problems}");
         assert_eq!(timeless(&output), served, "{name}");
     }
     let wrong = Scratch::new("plane.txt", "");
-    let (code, _, problems) = program(
-        &["-", "--mesh", wrong.path()],
-        &request("coarse").to_string(),
-    );
+    let (code, _, problems) = program(&["-", "--mesh", wrong.path()], &request("coarse").to_string());
     assert_eq!(code, 1);
     assert!(problems.contains(".ply"), "{problems}");
 }
 
 #[test]
 fn the_command_line_serves_by_default() {
-    let parsed = CommandLine::try_parse_from(["retina-server", "--listen", "127.0.0.1:0"])
-        .expect("arguments");
+    let parsed = CommandLine::try_parse_from(["retina-server", "--listen", "127.0.0.1:0"]).expect("arguments");
     assert!(parsed.command.is_none());
     assert_eq!(parsed.config.listen.port(), 0);
-    let parsed =
-        CommandLine::try_parse_from(["retina-server", "serve", "--queue", "3"]).expect("arguments");
+    let parsed = CommandLine::try_parse_from(["retina-server", "serve", "--queue", "3"]).expect("arguments");
     assert!(matches!(parsed.command, Some(Command::Serve(config)) if config.queue == 3));
     assert!(CommandLine::try_parse_from(["retina-server", "--threads", "0"]).is_err());
 }

@@ -12,14 +12,7 @@ fn value() -> impl Strategy<Value = Value> {
         any::<f64>().prop_map(|number| json!(number)),
         (-2.0..2.0).prop_map(|number| json!(number)),
         any::<i64>().prop_map(|number| json!(number)),
-        prop_oneof![
-            Just(0.0),
-            Just(-0.0),
-            Just(1e308),
-            Just(5e-324),
-            Just(0.4999)
-        ]
-        .prop_map(|number| json!(number)),
+        prop_oneof![Just(0.0), Just(-0.0), Just(1e308), Just(5e-324), Just(0.4999)].prop_map(|number| json!(number)),
     ];
     let word = prop_oneof![
         "[ -~]{0,12}",
@@ -41,12 +34,7 @@ fn value() -> impl Strategy<Value = Value> {
         ]
         .prop_map(str::to_owned),
     ];
-    let leaf = prop_oneof![
-        Just(Value::Null),
-        any::<bool>().prop_map(Value::from),
-        number,
-        word.prop_map(Value::from)
-    ];
+    let leaf = prop_oneof![Just(Value::Null), any::<bool>().prop_map(Value::from), number, word.prop_map(Value::from)];
     leaf.prop_recursive(3, 16, 4, |inner| {
         let key = prop_oneof![
             Just("kind"),
@@ -59,8 +47,7 @@ fn value() -> impl Strategy<Value = Value> {
         ];
         prop_oneof![
             vec(inner.clone(), 0..4).prop_map(Value::from),
-            vec((key.prop_map(str::to_owned), inner), 0..3)
-                .prop_map(|fields| Value::Object(Map::from_iter(fields))),
+            vec((key.prop_map(str::to_owned), inner), 0..3).prop_map(|fields| Value::Object(Map::from_iter(fields))),
         ]
     })
 }
@@ -69,10 +56,7 @@ fn value() -> impl Strategy<Value = Value> {
 fn pointers(value: &Value, at: String, found: &mut Vec<String>) {
     let mut inside = |key: &str, value: &Value| pointers(value, format!("{at}/{key}"), found);
     match value {
-        Value::Array(items) => items
-            .iter()
-            .enumerate()
-            .for_each(|(index, item)| inside(&index.to_string(), item)),
+        Value::Array(items) => items.iter().enumerate().for_each(|(index, item)| inside(&index.to_string(), item)),
         Value::Object(fields) => fields.iter().for_each(|(key, field)| inside(key, field)),
         _ => {}
     }
@@ -110,36 +94,20 @@ fn base() -> impl Strategy<Value = Value> {
             json!({"tip_mm": [0.0, 0.2, 0.1], "radius_mm": 0.2, "tip": {"bevelled": {"angle_deg": 45.0, "edge_radius_mm": 0.03}}})
         ),
     ];
-    (scenes, needles, prop_oneof![Just("linear"), Just("coarse")]).prop_map(
-        |(scene, needle, level)| {
-            let request = with(with(request(level), "/scene", scene), "/needle", needle);
-            with(request, "/effects", json!("auto"))
-        },
-    )
+    (scenes, needles, prop_oneof![Just("linear"), Just("coarse")]).prop_map(|(scene, needle, level)| {
+        let request = with(with(request(level), "/scene", scene), "/needle", needle);
+        with(request, "/effects", json!("auto"))
+    })
 }
 
 fn assert_answer_or_problem(reply: &crate::harness::Reply) {
     if reply.status == 200 {
-        assert_eq!(
-            reply.body["surface"]["vertices_mm"]
-                .as_array()
-                .map(Vec::len),
-            Some(64)
-        );
+        assert_eq!(reply.body["surface"]["vertices_mm"].as_array().map(Vec::len), Some(64));
         return;
     }
-    assert!(
-        reply.status.is_client_error(),
-        "{}: {}",
-        reply.status,
-        reply.body
-    );
+    assert!(reply.status.is_client_error(), "{}: {}", reply.status, reply.body);
     assert_eq!(reply.media_type(), "application/problem+json");
-    assert!(
-        reply.body["type"]
-            .as_str()
-            .is_some_and(|kind| kind.starts_with("/problems/"))
-    );
+    assert!(reply.body["type"].as_str().is_some_and(|kind| kind.starts_with("/problems/")));
 }
 
 proptest! {

@@ -24,17 +24,12 @@ pub fn assert_matches(name: &str, value: &Value) {
 /// Holds a value against a schema; fails with the path of the first place that does not match.
 pub fn check(schema: &Value, value: &Value, path: &str) -> Result<(), String> {
     if let Some(reference) = schema["$ref"].as_str() {
-        let target = description()
-            .pointer(&reference[1..])
-            .ok_or(format!("{path}: {reference} leads nowhere"))?;
+        let target = description().pointer(&reference[1..]).ok_or(format!("{path}: {reference} leads nowhere"))?;
         return check(target, value, path);
     }
     for key in ["oneOf", "anyOf"] {
         if let Some(ways) = schema[key].as_array() {
-            let failures: Vec<String> = ways
-                .iter()
-                .filter_map(|way| check(way, value, path).err())
-                .collect();
+            let failures: Vec<String> = ways.iter().filter_map(|way| check(way, value, path).err()).collect();
             return match failures.len() < ways.len() {
                 true => Ok(()),
                 false => Err(format!("{path}: none of {failures:?}")),
@@ -59,10 +54,7 @@ pub fn check(schema: &Value, value: &Value, path: &str) -> Result<(), String> {
     if !fits {
         return Err(format!("{path}: {value} is not {types:?}"));
     }
-    if schema["enum"]
-        .as_array()
-        .is_some_and(|allowed| !allowed.contains(value))
-    {
+    if schema["enum"].as_array().is_some_and(|allowed| !allowed.contains(value)) {
         return Err(format!("{path}: {value} is not one of {}", schema["enum"]));
     }
     fields(schema, value, path)?;
@@ -74,17 +66,11 @@ fn fields(schema: &Value, value: &Value, path: &str) -> Result<(), String> {
         return Ok(());
     };
     let missing = schema["required"].as_array().into_iter().flatten();
-    if let Some(name) = missing
-        .filter_map(Value::as_str)
-        .find(|name| !fields.contains_key(*name))
-    {
+    if let Some(name) = missing.filter_map(Value::as_str).find(|name| !fields.contains_key(*name)) {
         return Err(format!("{path}: {name} is missing"));
     }
     for (name, field) in fields {
-        match (
-            schema["properties"].get(name),
-            schema.get("additionalProperties"),
-        ) {
+        match (schema["properties"].get(name), schema.get("additionalProperties")) {
             (Some(schema), _) | (None, Some(schema @ Value::Object(_))) => {
                 check(schema, field, &format!("{path}.{name}"))?
             }
@@ -99,17 +85,10 @@ fn items(schema: &Value, value: &Value, path: &str) -> Result<(), String> {
         return Ok(());
     };
     let length = items.len() as u64;
-    if schema["minItems"]
-        .as_u64()
-        .is_some_and(|least| length < least)
-        || schema["maxItems"]
-            .as_u64()
-            .is_some_and(|most| length > most)
+    if schema["minItems"].as_u64().is_some_and(|least| length < least)
+        || schema["maxItems"].as_u64().is_some_and(|most| length > most)
     {
         return Err(format!("{path}: {length} items"));
     }
-    items
-        .iter()
-        .enumerate()
-        .try_for_each(|(index, item)| check(&schema["items"], item, &format!("{path}[{index}]")))
+    items.iter().enumerate().try_for_each(|(index, item)| check(&schema["items"], item, &format!("{path}[{index}]")))
 }

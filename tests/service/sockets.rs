@@ -70,10 +70,7 @@ fn a_client_that_goes_frees_its_thread() {
     let started = Instant::now();
     assert_eq!(service.predict(&agent, &request("linear")).0, 200);
     let waited = started.elapsed();
-    assert!(
-        waited < whole / 2,
-        "waited {waited:?} behind work of {whole:?} that nobody wanted"
-    );
+    assert!(waited < whole / 2, "waited {waited:?} behind work of {whole:?} that nobody wanted");
 }
 
 #[test]
@@ -85,14 +82,6 @@ fn the_end_waits_for_what_was_accepted() {
     let mut answer = String::new();
     connection.read_to_string(&mut answer).expect("answer");
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
-    service
-        .ended
-        .take()
-        .expect("running")
-        .join()
-        .expect("the service ends in order");
-    assert!(
-        TcpStream::connect(service.address).is_err(),
-        "connections are accepted after the end"
-    );
+    service.ended.take().expect("running").join().expect("the service ends in order");
+    assert!(TcpStream::connect(service.address).is_err(), "connections are accepted after the end");
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::types::{ContactReport, ContactState, PredictError, SolverReport};
-use crate::equilibrium::{ContactSettings, ContactSummary, Equilibrium, Motion, Solid, Tool, Wall};
+use crate::equilibrium::{ContactSettings, ContactSummary, Equilibrium, MeshSize, Motion, Solid, Tool, Wall};
 use crate::mesh::disc::DiscGeometry;
 use crate::mesh::sample::locate;
 use crate::mesh::wall::{WallDivision, WallTopology};
@@ -88,6 +88,8 @@ pub struct ContactEstimate {
     pub travel_mm: f64,
 }
 
+/// Thickness of the innermost element of the retina, in contact radii over the number of elements through it.
+const FIRST_ELEMENT_PER_CONTACT: f64 = 2.0;
 /// Smallest contact radius that a mesh is made for, in needle radii.
 const SMALLEST_CONTACT: f64 = 0.05;
 /// The answer of a finite-element level, patch frame.
@@ -133,15 +135,18 @@ pub struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// The disc of a mesh around the estimated contact.
-    fn disc(&self, resolution: &Resolution, estimate: &ContactEstimate) -> DiscGeometry {
+    /// The mesh around the estimated contact.
+    fn mesh(&self, resolution: &Resolution, estimate: &ContactEstimate) -> MeshSize {
         let needle_radius = self.tool.body.radius_mm();
         let contact = estimate.radius_mm.max(SMALLEST_CONTACT * needle_radius);
         let core = resolution.core_per_contact * contact;
         let rim = contact + resolution.rim_mm;
         let ratio = (rim / core).powf(1.0 / resolution.rings as f64);
         let radii = (0..=resolution.rings).map(|ring| core * ratio.powi(ring as i32)).collect();
-        DiscGeometry { center: estimate.center, radii }
+        MeshSize {
+            disc: DiscGeometry { center: estimate.center, radii },
+            first_element_mm: FIRST_ELEMENT_PER_CONTACT * contact / resolution.retina_elements as f64,
+        }
     }
 
     /// Solves on a mesh around the estimated contact, from the displacements `start` (patch parameters and depth in layers
@@ -158,9 +163,9 @@ impl Problem<'_> {
     ) -> Result<FiniteElementAnswer, PredictError> {
         progress.stage("mesh");
         let Bench { level, resolution, topology, workspace } = bench;
-        let disc = self.disc(resolution, estimate);
+        let mesh = self.mesh(resolution, estimate);
         let wall =
-            Wall::new(topology, &self.patch.surface, self.tissue, &disc, self.solid, resolution.contact, self.tool)?;
+            Wall::new(topology, &self.patch.surface, self.tissue, &mesh, self.solid, resolution.contact, self.tool)?;
         let touch_mm = wall.touch(&self.motion.direction, estimate.touch_mm).unwrap_or(estimate.touch_mm);
         let motion = match self.motion.force_mn {
             Some(force_mn) => {

@@ -14,13 +14,7 @@ use super::{Kind, Problem};
 
 /// The problem of a number outside its range; `field` is its path in the request.
 pub fn from_out_of_range(field: String, error: &OutOfRange) -> Problem {
-    let OutOfRange {
-        value,
-        min,
-        max,
-        unit,
-        ..
-    } = error;
+    let OutOfRange { value, min, max, unit, .. } = error;
     let unit = match *unit {
         "1" => String::new(),
         unit => format!(" {unit}"),
@@ -28,11 +22,7 @@ pub fn from_out_of_range(field: String, error: &OutOfRange) -> Problem {
     let allowed = format!("{min} to {max}{unit}");
     let detail = format!("{field} = {value}{unit} is outside the allowed range {allowed}");
     // What is not finite has no JSON number, so it is told as text.
-    let value = if value.is_finite() {
-        json!(value)
-    } else {
-        json!(value.to_string())
-    };
+    let value = if value.is_finite() { json!(value) } else { json!(value.to_string()) };
     Problem::field(Kind::OutOfRange, field, Some(value), allowed, detail)
 }
 
@@ -53,41 +43,25 @@ pub fn from_predict(error: PredictError) -> Problem {
     let detail = error.to_string();
     match error {
         PredictError::OutOfRange(error) => from_out_of_range(wire_field(&error.field), &error),
-        PredictError::PointsAway {
-            field,
-            angle_deg,
-            max_deg,
-        } => Problem::field(
+        PredictError::PointsAway { field, angle_deg, max_deg } => Problem::field(
             Kind::PointsAway,
             field,
             Some(json!(angle_deg)),
             format!("at most {max_deg} degrees from the inward normal"),
             detail,
         ),
-        PredictError::OutsidePatch {
-            x_mm,
-            y_mm,
-            limit_mm,
-        } => Problem::field(
+        PredictError::OutsidePatch { x_mm, y_mm, limit_mm } => Problem::field(
             Kind::OutsidePatch,
             "needle.tip_mm",
             Some(json!([x_mm, y_mm])),
             format!("contact within {limit_mm} mm of the patch's centre in x and y"),
             detail,
         ),
-        PredictError::BeyondPuncture {
-            force_mn,
-            pressure_kpa,
-            limit_kpa,
-            ..
-        } => Problem::field(
+        PredictError::BeyondPuncture { force_mn, pressure_kpa, limit_kpa, .. } => Problem::field(
             Kind::BeyondPuncture,
             "force_mn",
             Some(json!(force_mn)),
-            format!(
-                "at most {:.3} mN with this needle",
-                force_mn * limit_kpa / pressure_kpa
-            ),
+            format!("at most {:.3} mN with this needle", force_mn * limit_kpa / pressure_kpa),
             detail,
         ),
         PredictError::TooDeep { depth_mm, limit_mm } => Problem::field(
@@ -113,28 +87,18 @@ pub fn from_predict(error: PredictError) -> Problem {
             detail,
         ),
         PredictError::Mesh(error @ WallError::Linear(_)) => Problem::internal(error),
-        PredictError::Solver {
-            cause: NewtonError::Interrupted { .. },
-            ..
-        } => Problem::new(
-            Kind::TookTooLong,
-            "The work was stopped at the time limit of the server.",
-        ),
-        PredictError::Solver { .. } | PredictError::Linear(_) => {
-            Problem::new(Kind::NoEquilibrium, detail)
+        PredictError::Solver { cause: NewtonError::Interrupted { .. }, .. } => {
+            Problem::new(Kind::TookTooLong, "The work was stopped at the time limit of the server.")
         }
+        PredictError::Solver { .. } | PredictError::Linear(_) => Problem::new(Kind::NoEquilibrium, detail),
     }
 }
 
 fn from_patch(error: &PatchError, detail: String) -> Problem {
     match error {
-        PatchError::ContactNotFinite { .. } => Problem::field(
-            Kind::OutOfRange,
-            "needle.tip_mm",
-            None,
-            "finite coordinates",
-            detail,
-        ),
+        PatchError::ContactNotFinite { .. } => {
+            Problem::field(Kind::OutOfRange, "needle.tip_mm", None, "finite coordinates", detail)
+        }
         PatchError::ContactTooFar { .. } => Problem::field(
             Kind::OutsidePatch,
             "needle.tip_mm",
@@ -142,9 +106,7 @@ fn from_patch(error: &PatchError, detail: String) -> Problem {
             format!("contact within {CONTACT_DISTANCE_LIMIT_MM} mm of the mesh"),
             detail,
         ),
-        PatchError::TooFewVertices { .. }
-        | PatchError::NoCommonNormal
-        | PatchError::Folded { .. } => Problem::field(
+        PatchError::TooFewVertices { .. } | PatchError::NoCommonNormal | PatchError::Folded { .. } => Problem::field(
             Kind::InvalidMesh,
             "scene.surface",
             None,

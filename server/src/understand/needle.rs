@@ -16,24 +16,15 @@ const SHORTEST_DIRECTION: f64 = 1e-9;
 /// The needle, inside the core's ranges.
 pub(super) fn needle(spec: &NeedleSpec) -> Result<Needle, Problem> {
     let radius_mm = radius_mm(spec)?;
-    let shape = NeedleShape {
-        radius_mm,
-        tip: tip(spec.tip.as_ref(), radius_mm)?,
-    };
+    let shape = NeedleShape { radius_mm, tip: tip(spec.tip.as_ref(), radius_mm)? };
     let tip_mm = Point3::from(spec.tip_mm.0);
     let needle = match (&spec.orientation_xyzw, &spec.direction) {
         (Some(_), Some(_)) => return Err(both("needle.direction", "needle.orientation_xyzw")),
-        (Some(xyzw), None) => Needle {
-            shape,
-            tip_mm,
-            orientation: rotation("needle.orientation_xyzw", xyzw.0)?,
-        },
+        (Some(xyzw), None) => Needle { shape, tip_mm, orientation: rotation("needle.orientation_xyzw", xyzw.0)? },
         (None, Some(direction)) => Needle::pointing(shape, tip_mm, &unit(direction)?),
         (None, None) => Needle::pointing(shape, tip_mm, &-Vector3::z_axis()),
     };
-    needle
-        .validate()
-        .map_err(|error| from_out_of_range(tip_field(&error.field, &shape), &error))?;
+    needle.validate().map_err(|error| from_out_of_range(tip_field(&error.field, &shape), &error))?;
     Ok(needle)
 }
 
@@ -70,30 +61,17 @@ fn unit(direction: &Vector) -> Result<Unit<Vector3<f64>>, Problem> {
 
 fn tip(spec: Option<&TipSpec>, radius_mm: f64) -> Result<Tip, Problem> {
     let edge = |given: Option<f64>| given.unwrap_or(EDGE_FRACTION_OF_RADIUS * radius_mm);
-    let flat = |spec: &FlatTip| Tip::Flat {
-        edge_radius_mm: edge(spec.edge_radius_mm),
-    };
+    let flat = |spec: &FlatTip| Tip::Flat { edge_radius_mm: edge(spec.edge_radius_mm) };
     let bevelled = |spec: &BevelledTip| Tip::Bevelled {
         angle_deg: spec.angle_deg.unwrap_or(BEVEL_ANGLE.default),
         edge_radius_mm: edge(spec.edge_radius_mm),
     };
     match spec {
         None | Some(TipSpec::Name(TipName::Hemispherical)) => Ok(Tip::Hemispherical),
-        Some(TipSpec::Name(TipName::Flat)) => Ok(flat(&FlatTip {
-            edge_radius_mm: None,
-        })),
-        Some(TipSpec::Name(TipName::Bevelled)) => Ok(bevelled(&BevelledTip {
-            angle_deg: None,
-            edge_radius_mm: None,
-        })),
-        Some(TipSpec::Shape(TipShape {
-            flat: Some(spec),
-            bevelled: None,
-        })) => Ok(flat(spec)),
-        Some(TipSpec::Shape(TipShape {
-            flat: None,
-            bevelled: Some(spec),
-        })) => Ok(bevelled(spec)),
+        Some(TipSpec::Name(TipName::Flat)) => Ok(flat(&FlatTip { edge_radius_mm: None })),
+        Some(TipSpec::Name(TipName::Bevelled)) => Ok(bevelled(&BevelledTip { angle_deg: None, edge_radius_mm: None })),
+        Some(TipSpec::Shape(TipShape { flat: Some(spec), bevelled: None })) => Ok(flat(spec)),
+        Some(TipSpec::Shape(TipShape { flat: None, bevelled: Some(spec) })) => Ok(bevelled(spec)),
         Some(TipSpec::Shape(_)) => Err(Problem::field(
             Kind::InvalidRequest,
             "needle.tip",

@@ -6,18 +6,14 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::mesh_file::{MeshFormat, read_mesh};
 use retina_core::surface::{EYE_RADIUS, MeshError, PIT_DEPTH, PIT_SIGMA, TriangleMesh};
-use retina_core::tissue::ranges::{
-    CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA,
-};
+use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA};
 use retina_core::tissue::{Layer, Tissue};
 
 use super::{DEFAULT_SCENE, rotation, unknown_name};
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::{Triangle, Vector};
 use crate::wire::request::SceneChoice;
-use crate::wire::scene::{
-    LayerSpec, PoseSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec,
-};
+use crate::wire::scene::{LayerSpec, PoseSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec};
 
 /// Name of every scene that is written out.
 const INLINE_NAME: &str = "inline";
@@ -47,17 +43,9 @@ pub fn chosen(choice: Option<&SceneChoice>) -> Result<Scene, Problem> {
 /// # Errors
 /// A problem that names the field.
 pub fn scene(spec: &SceneSpec) -> Result<Scene, Problem> {
-    let surface = spec.surface.as_ref().map_or(
-        Ok(SceneSurface::Sphere {
-            radius_mm: EYE_RADIUS.default,
-        }),
-        surface,
-    )?;
+    let surface = spec.surface.as_ref().map_or(Ok(SceneSurface::Sphere { radius_mm: EYE_RADIUS.default }), surface)?;
     if let (SceneSurface::Mesh(_), Some(_)) = (&surface, &spec.pose) {
-        return Err(misplaced(
-            "scene.pose",
-            "a mesh, which places its own patch",
-        ));
+        return Err(misplaced("scene.pose", "a mesh, which places its own patch"));
     }
     let scene = Scene {
         name: INLINE_NAME.to_owned(),
@@ -65,9 +53,7 @@ pub fn scene(spec: &SceneSpec) -> Result<Scene, Problem> {
         tissue: spec.tissue.as_ref().map_or_else(Tissue::default, tissue),
         scene_from_patch: spec.pose.as_ref().map_or(Ok(Isometry3::identity()), pose)?,
     };
-    scene
-        .validate()
-        .map_err(|error| from_out_of_range(field(&error.field, spec), &error))?;
+    scene.validate().map_err(|error| from_out_of_range(field(&error.field, spec), &error))?;
     Ok(scene)
 }
 
@@ -76,12 +62,8 @@ fn field(core: &str, spec: &SceneSpec) -> String {
     if let Some(index) = core.strip_prefix("scene_from_patch.translation_mm") {
         return format!("scene.pose.position_mm{index}");
     }
-    let whole = matches!(
-        spec.tissue
-            .as_ref()
-            .and_then(|tissue| tissue.retina.as_ref()),
-        None | Some(RetinaSpec::Whole(_))
-    );
+    let whole =
+        matches!(spec.tissue.as_ref().and_then(|tissue| tissue.retina.as_ref()), None | Some(RetinaSpec::Whole(_)));
     match core.strip_prefix("tissue.retina[0]") {
         Some(number) if whole => format!("scene.tissue.retina{number}"),
         _ => format!("scene.{core}"),
@@ -123,10 +105,7 @@ fn refuse_misplaced(spec: &SurfaceSpec) -> Result<(), Problem> {
     };
     for (name, given, kinds) in fields {
         if given && !kinds.contains(&spec.kind) {
-            return Err(misplaced(
-                &format!("scene.surface.{name}"),
-                &format!("the kind {kind}"),
-            ));
+            return Err(misplaced(&format!("scene.surface.{name}"), &format!("the kind {kind}")));
         }
     }
     Ok(())
@@ -148,10 +127,7 @@ fn mesh(spec: &SurfaceSpec) -> Result<TriangleMesh, Problem> {
 }
 
 fn indexed(vertices: &[Vector], triangles: &[Triangle]) -> Result<TriangleMesh, Problem> {
-    let vertices = vertices
-        .iter()
-        .map(|vertex| Point3::from(vertex.0))
-        .collect();
+    let vertices = vertices.iter().map(|vertex| Point3::from(vertex.0)).collect();
     let triangles = triangles.iter().map(|triangle| triangle.0).collect();
     TriangleMesh::new(vertices, triangles).map_err(|error| {
         let field = match error {
@@ -181,16 +157,11 @@ fn tissue(spec: &TissueSpec) -> Tissue {
     let retina = match &spec.retina {
         None => vec![RETINA.default_layer()],
         Some(RetinaSpec::Whole(whole)) => vec![layer(whole, &RETINA)],
-        Some(RetinaSpec::Sublayers(layers)) => layers
-            .iter()
-            .map(|spec| layer(spec, &RETINA_SUBLAYER))
-            .collect(),
+        Some(RetinaSpec::Sublayers(layers)) => layers.iter().map(|spec| layer(spec, &RETINA_SUBLAYER)).collect(),
     };
     let or_default = |spec: &Option<LayerSpec>, ranges| layer(&spec.unwrap_or_default(), ranges);
     Tissue {
-        inner_limiting_membrane: spec
-            .inner_limiting_membrane
-            .map(|spec| layer(&spec, &INNER_LIMITING_MEMBRANE)),
+        inner_limiting_membrane: spec.inner_limiting_membrane.map(|spec| layer(&spec, &INNER_LIMITING_MEMBRANE)),
         retina,
         choroid: or_default(&spec.choroid, &CHOROID),
         sclera: or_default(&spec.sclera, &SCLERA),
@@ -201,9 +172,7 @@ fn layer(spec: &LayerSpec, ranges: &LayerRanges) -> Layer {
     let default = ranges.default_layer();
     Layer {
         thickness_mm: spec.thickness_mm.unwrap_or(default.thickness_mm),
-        youngs_modulus_kpa: spec
-            .youngs_modulus_kpa
-            .unwrap_or(default.youngs_modulus_kpa),
+        youngs_modulus_kpa: spec.youngs_modulus_kpa.unwrap_or(default.youngs_modulus_kpa),
         poisson_ratio: spec.poisson_ratio.unwrap_or(default.poisson_ratio),
     }
 }
@@ -214,10 +183,7 @@ fn pose(spec: &PoseSpec) -> Result<Isometry3<f64>, Problem> {
         Some(xyzw) => rotation("scene.pose.orientation_xyzw", xyzw.0)?,
         None => UnitQuaternion::identity(),
     };
-    Ok(Isometry3::from_parts(
-        Translation3::from(position),
-        orientation,
-    ))
+    Ok(Isometry3::from_parts(Translation3::from(position), orientation))
 }
 
 fn misplaced(field: &str, at: &str) -> Problem {

@@ -28,8 +28,7 @@ impl<'de> Visitor<'de> for SceneVisitor {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<SceneChoice, A::Error> {
-        SceneSpec::deserialize(MapAccessDeserializer::new(map))
-            .map(|spec| SceneChoice::Inline(Box::new(spec)))
+        SceneSpec::deserialize(MapAccessDeserializer::new(map)).map(|spec| SceneChoice::Inline(Box::new(spec)))
     }
 }
 
@@ -102,9 +101,7 @@ impl<'de> Visitor<'de> for RetinaVisitor {
 
     fn visit_seq<A: SeqAccess<'de>>(self, layers: A) -> Result<RetinaSpec, A::Error> {
         let layers = Vec::<Object<LayerSpec>>::deserialize(SeqAccessDeserializer::new(layers))?;
-        Ok(RetinaSpec::Sublayers(
-            layers.into_iter().map(|layer| layer.0).collect(),
-        ))
+        Ok(RetinaSpec::Sublayers(layers.into_iter().map(|layer| layer.0).collect()))
     }
 }
 

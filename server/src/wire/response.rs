@@ -142,9 +142,7 @@ pub struct TimeAnswer<'a> {
 impl<'a> PredictResponse<'a> {
     /// The answer that tells of `prediction`, which took the stages that are given.
     pub fn new(prediction: &'a Prediction, stages: &'a [(&'static str, Duration)]) -> Self {
-        let Prediction {
-            needle, contact, ..
-        } = prediction;
+        let Prediction { needle, contact, .. } = prediction;
         Self {
             surface: SurfaceAnswer {
                 vertices_mm: &prediction.vertices,
@@ -168,15 +166,10 @@ impl<'a> PredictResponse<'a> {
                 max_pressure_kpa: contact.max_pressure_kpa,
                 max_penetration_um: contact.max_penetration_mm * 1e3,
             },
-            accuracy: AccuracyAnswer {
-                level: prediction.level.name(),
-            },
+            accuracy: AccuracyAnswer { level: prediction.level.name() },
             effects: prediction.effects.iter().map(EffectAnswer::from).collect(),
             solver: SolverAnswer::from(&prediction.solver),
-            time_us: TimeAnswer {
-                total: micros(stages.iter().map(|(_, time)| *time).sum()),
-                stages,
-            },
+            time_us: TimeAnswer { total: micros(stages.iter().map(|(_, time)| *time).sum()), stages },
             warnings: &prediction.warnings,
         }
     }
@@ -221,10 +214,7 @@ fn vectors<S: Serializer>(vectors: &&[Vector3<f64>], serializer: S) -> Result<S:
     list.end()
 }
 
-fn stages<S: Serializer>(
-    stages: &&[(&'static str, Duration)],
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
+fn stages<S: Serializer>(stages: &&[(&'static str, Duration)], serializer: S) -> Result<S::Ok, S::Error> {
     let mut map = serializer.serialize_map(Some(stages.len()))?;
     for (name, time) in *stages {
         map.serialize_entry(name, &micros(*time))?;

@@ -14,25 +14,13 @@ use super::object;
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
     /// The inner surface of the retina at rest; a sphere of 12 mm radius when left out.
-    #[serde(
-        default,
-        deserialize_with = "object::optional",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub surface: Option<SurfaceSpec>,
     /// The layers under it; retina on choroid on sclera with their defaults when left out.
-    #[serde(
-        default,
-        deserialize_with = "object::optional",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub tissue: Option<TissueSpec>,
     /// Where the patch stands in the scene frame; the identity when left out. Refused for a mesh, which places its own patch.
-    #[serde(
-        default,
-        deserialize_with = "object::optional",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseSpec>,
 }
 
@@ -85,28 +73,16 @@ pub struct SurfaceSpec {
 #[serde(deny_unknown_fields)]
 pub struct TissueSpec {
     /// The membrane between vitreous and retina; none when left out, the default one for `{}`.
-    #[serde(
-        default,
-        deserialize_with = "object::optional",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub inner_limiting_membrane: Option<LayerSpec>,
     /// The retina as one layer, or its sublayers from the vitreous outwards.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub retina: Option<RetinaSpec>,
     /// Choroid with Bruch's membrane and the pigment epithelium.
-    #[serde(
-        default,
-        deserialize_with = "object::optional",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub choroid: Option<LayerSpec>,
     /// Sclera.
-    #[serde(
-        default,
-        deserialize_with = "object::optional",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub sclera: Option<LayerSpec>,
 }
 
