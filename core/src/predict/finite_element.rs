@@ -40,21 +40,21 @@ pub const COARSE: Resolution = Resolution {
     retina_elements: 1,
     choroid_elements: 1,
     sclera_elements: 0,
-    core_per_contact: 0.8,
-    rim_mm: 1.5,
+    core_per_contact: 1.0,
+    rim_mm: 1.2,
     contact: ContactSettings { stiffness_kpa_per_mm: 5e4, smoothing_mm: 5e-4, points_per_edge: 3 },
 };
 
 /// Level `reference`.
 pub const REFERENCE: Resolution = Resolution {
-    core_cells: 4,
-    rings: 8,
+    core_cells: 3,
+    rings: 12,
     retina_elements: 3,
-    choroid_elements: 2,
+    choroid_elements: 1,
     sclera_elements: 1,
     core_per_contact: 1.0,
     rim_mm: 2.0,
-    contact: ContactSettings { stiffness_kpa_per_mm: 3e5, smoothing_mm: 2e-4, points_per_edge: 3 },
+    contact: ContactSettings { stiffness_kpa_per_mm: 3e5, smoothing_mm: 2e-4, points_per_edge: 4 },
 };
 
 impl Resolution {

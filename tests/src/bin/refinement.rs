@@ -25,8 +25,7 @@ const ACCEPTED: (f64, f64) = (0.5, 0.01);
 fn refined(factor: f64) -> Resolution {
     let finer = |count: usize| (count as f64 * factor).round() as usize;
     Resolution {
-        // Even, so that the core keeps a node in its middle.
-        core_cells: 2 * finer(REFERENCE.core_cells / 2),
+        core_cells: finer(REFERENCE.core_cells),
         rings: finer(REFERENCE.rings),
         retina_elements: finer(REFERENCE.retina_elements),
         choroid_elements: finer(REFERENCE.choroid_elements),
