@@ -40,8 +40,8 @@ pub const COARSE: Resolution = Resolution {
     retina_elements: 1,
     choroid_elements: 1,
     sclera_elements: 0,
-    core_per_contact: 1.0,
-    rim_mm: 1.2,
+    core_per_contact: 0.8,
+    rim_mm: 1.5,
     contact: ContactSettings { stiffness_kpa_per_mm: 5e4, smoothing_mm: 5e-4, points_per_edge: 3 },
 };
 
