@@ -4,3 +4,5 @@ mod block;
 mod closed_forms;
 mod homogeneous;
 mod manufactured;
+mod pressed_needle;
+mod pressed_slab;

@@ -220,6 +220,41 @@ impl Mesh {
         load
     }
 
+    /// Displacement of the plane z = 0 at a rest position in it.
+    pub fn interpolate_top(&self, positions: &[f64], at: Vector3<f64>) -> Vector3<f64> {
+        const STEPS: usize = 20;
+        for element in 0..self.elements.len() {
+            let group = self.elements.group(element);
+            let near = |v: u32| (self.at(v as usize) - at).norm();
+            let reach = group.iter().map(|&v| (self.at(v as usize) - self.at(group[0] as usize)).norm()).fold(0.0, f64::max);
+            let on_top = NODE_OFFSETS.iter().zip(group).all(|(o, &v)| o[2] != ORDER || self.at(v as usize).z.abs() < GLUE_MM);
+            if !on_top || near(group[0]) > 1.5 * reach {
+                continue;
+            }
+            let mut local = Vector3::new(0.0, 0.0, 1.0);
+            for _ in 0..STEPS {
+                let shapes = shapes(local.into());
+                let mut place = Vector3::zeros();
+                let mut jacobian = Matrix3::zeros();
+                for (shape, &v) in shapes.iter().zip(group) {
+                    place += self.at(v as usize) * shape.value;
+                    jacobian += self.at(v as usize) * Vector3::from(shape.gradient).transpose();
+                }
+                let Some(inverse) = jacobian.try_inverse() else { break };
+                let step = inverse * (at - place);
+                local += step;
+                if local.amax() > 3.0 {
+                    break;
+                }
+                if step.amax() < 1e-12 && local.amax() < 1.0 + 1e-6 {
+                    let moved = |v: usize| Vector3::from_row_slice(&positions[3 * v..3 * v + 3]) - self.at(v);
+                    return shapes.iter().zip(group).map(|(s, &v)| moved(v as usize) * s.value).sum();
+                }
+            }
+        }
+        panic!("{at:?} lies in no element of the top");
+    }
+
     /// L2 norm over the volume of computed minus exact displacement.
     pub fn l2_error(&self, positions: &[f64], exact: impl Fn(Vector3<f64>) -> Vector3<f64>) -> f64 {
         let mut sum = 0.0;
@@ -297,6 +332,8 @@ pub struct Body<'a> {
     law: Law,
     geometry: SolidGeometry,
     materials: Vec<Lame>,
+    /// How Newton's steps are guarded.
+    pub globalization: Globalization,
     dofs: Dofs,
     pattern: Pattern,
     symbolic: SymbolicFactor,
@@ -310,7 +347,9 @@ impl<'a> Body<'a> {
         let dofs = Dofs::new(mesh.vertices(), mesh.elimination_order(), held, None);
         let pattern = Pattern::new(&dofs, &[&mesh.elements]);
         let symbolic = SymbolicFactor::new(&pattern).expect("analysed");
-        Body { mesh, law, geometry, materials: vec![material; mesh.elements.len()], dofs, pattern, symbolic }
+        let materials = vec![material; mesh.elements.len()];
+        let globalization = Globalization::PredictedStress;
+        Body { mesh, law, geometry, materials, globalization, dofs, pattern, symbolic }
     }
 
     pub fn unknowns(&self) -> usize {
@@ -337,7 +376,7 @@ impl<'a> Body<'a> {
             }
         }
         let settings = NewtonSettings {
-            globalization: Globalization::PredictedStress,
+            globalization: self.globalization,
             force_scale_mn,
             tolerance_mn: tolerance * force_scale_mn,
             max_iterations: 50,
@@ -352,15 +391,29 @@ impl<'a> Body<'a> {
         })
     }
 
-    /// The mean first Piola–Kirchhoff stress, from the nodal forces that hold the body at `positions`.
-    pub fn mean_stress(&self, positions: &[f64]) -> Matrix3<f64> {
+    /// The nodal forces that hold the body at `positions`.
+    pub fn forces(&self, positions: &[f64]) -> Vec<f64> {
         let vertices = self.mesh.vertices();
         let all = Dofs::new(vertices, 0..vertices, |_, _| false, None);
         let mut forces = vec![0.0; 3 * vertices + 3];
         self.with_terms(|terms| gradient(terms, positions, &all, &mut Scratch::default(), &mut forces));
+        forces.truncate(3 * vertices);
+        forces
+    }
+
+    /// Largest nodal force on a free component at `positions`.
+    pub fn largest_free_force(&self, positions: &[f64]) -> f64 {
+        let forces = self.forces(positions);
+        let free = (0..forces.len()).filter(|&at| self.dofs.index(at / 3, at % 3).is_some());
+        free.map(|at| forces[at].abs()).fold(0.0, f64::max)
+    }
+
+    /// The mean first Piola–Kirchhoff stress, from the nodal forces that hold the body at `positions`.
+    pub fn mean_stress(&self, positions: &[f64]) -> Matrix3<f64> {
+        let forces = self.forces(positions);
         let mut volume = 0.0;
         self.mesh.in_volume(|_, part, _| volume += part);
         let moment = |v: usize| Vector3::from_row_slice(&forces[3 * v..3 * v + 3]) * self.mesh.at(v).transpose();
-        (0..vertices).map(moment).sum::<Matrix3<f64>>() / volume
+        (0..self.mesh.vertices()).map(moment).sum::<Matrix3<f64>>() / volume
     }
 }

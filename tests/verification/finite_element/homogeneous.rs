@@ -3,6 +3,7 @@
 use fastrand::Rng;
 use nalgebra::{Matrix3, Vector3};
 use retina_core::effects::finite_strain::{Lame, NeoHookean};
+use retina_core::solve::newton::Globalization;
 use retina_tests::tolerance::IN_THE_SPACE;
 
 use super::block::{Body, Law, Mesh, block, lame};
@@ -86,50 +87,58 @@ fn neo_hookean_uniaxial_and_equibiaxial() {
     const EQUIBIAXIAL: [f64; 5] = [-31.5, -5.249902, 0.798122, 1.368313, 1.96875];
     // Six digits are printed, and the volume changes by p/κ < 32 µ/κ = 6.4e-4 at ν 0.49999, of which P takes up to five times (λ⁻⁵).
     const LIMIT: f64 = 3.2e-3;
+    // Free faces wrinkle near these stretches (Biot 1963: 0.44 and 0.67 for the incompressible half-space, somewhat earlier for a cube): the
+    // homogeneous state is then an equilibrium that no stable path reaches, and the closed form is put in and held against balance.
+    const WRINKLED: [f64; 2] = [0.6, 0.75];
+    const STEPS: i32 = 6;
     let mut rng = Rng::with_seed(7);
     let mesh = distorted_cube(&mut rng);
     for (held, published) in [([true, false, false], UNIAXIAL), ([true, true, false], EQUIBIAXIAL)] {
-        let support = |at: Vector3<f64>, k: usize| at[k].abs() < 1e-9 || (held[k] && (at[k] - 1.0).abs() < 1e-9);
-        for law in [NeoHookean::Logarithmic, NeoHookean::Isochoric] {
-            for poisson in [0.3, 0.49, 0.49999] {
-                let material = lame(1.0, poisson);
-                let body = Body::new(&mesh, Law::NeoHookean(law), material, support);
-                for (stretch, limit) in STRETCHES.into_iter().zip(published) {
-                    let mut positions = mesh.rest.clone();
-                    let mut reached: f64 = 1.0;
-                    let mut lateral: f64 = 1.0;
-                    const STEPS: i32 = 12;
-                    for step in 1..=STEPS {
-                        let next = stretch.powf(f64::from(step) / f64::from(STEPS));
-                        let side = next.powf(if held[1] { -2.0 } else { -0.5 });
-                        // The start of each step stretches the last state at constant volume; free components are then solved for.
-                        for vertex in 0..mesh.vertices() {
-                            for k in 0..3 {
-                                positions[3 * vertex + k] *= if held[k] { next / reached } else { side / lateral };
-                            }
+        for (law, poisson) in [NeoHookean::Logarithmic, NeoHookean::Isochoric]
+            .into_iter()
+            .flat_map(|law| [0.3, 0.49, 0.49999].map(|poisson| (law, poisson)))
+        {
+            let material = lame(1.0, poisson);
+            let on_side = |at: Vector3<f64>, k: usize| at[k].abs() < 1e-9 || (held[k] && (at[k] - 1.0).abs() < 1e-9);
+            let mut free = Body::new(&mesh, Law::NeoHookean(law), material, on_side);
+            free.globalization = Globalization::LineSearch;
+            for (stretch, limit) in STRETCHES.into_iter().zip(published) {
+                let across = lateral_stretch(law, material, stretch, held);
+                let all = held.map(|h| if h { stretch } else { across });
+                let exact = principal(law, material, all)[0];
+                let mut positions = mesh.rest.clone();
+                if stretch > WRINKLED[usize::from(held[1])] {
+                    // Each step starts from the last state, stretched at constant volume.
+                    let along = stretch.powf(1.0 / f64::from(STEPS));
+                    let side = along.powf(if held[1] { -2.0 } else { -0.5 });
+                    for _ in 0..STEPS {
+                        for (at, position) in positions.iter_mut().enumerate() {
+                            *position *= if held[at % 3] { along } else { side };
                         }
-                        (reached, lateral) = (next, side);
-                        body.solve(&mut positions, &[], 1.0, RESIDUAL);
+                        free.solve(&mut positions, &[], 1.0, RESIDUAL);
                     }
-                    let across = lateral_stretch(law, material, stretch, held);
-                    let all = held.map(|h| if h { stretch } else { across });
-                    let exact = principal(law, material, all)[0];
-                    let stress = body.mean_stress(&positions);
-                    let error = (stress[(0, 0)] - exact).abs() / exact.abs();
-                    let corner = mesh.vertex([1.0; 3]);
-                    let side = positions[3 * corner + 2];
-                    println!(
-                        "{law:?} ν {poisson} held {held:?} λ {stretch}: P/µ {:.6} exact {:.6} ({error:.1e}), published {limit}; side {side:.8} exact {across:.8}",
-                        stress[(0, 0)] / material.mu,
-                        exact / material.mu,
-                    );
-                    // Stresses are λ times differences of positions: the same tolerance, magnified by λ/µ.
-                    let rounding = IN_THE_SPACE * (material.lambda / material.mu).max(1.0);
-                    assert!(error < rounding && (side - across).abs() < IN_THE_SPACE * across.max(1.0));
-                    if poisson == 0.49999 {
-                        let error = (stress[(0, 0)] / material.mu - limit).abs() / limit.abs();
-                        assert!(error < LIMIT, "P/µ differs from the incompressible {limit} by {error:e}");
-                    }
+                } else {
+                    positions = mesh.moved(|at| at.component_mul(&Vector3::from(all)) - at);
+                }
+                let unbalanced = free.largest_free_force(&positions) / material.mu;
+                let stress = free.mean_stress(&positions);
+                let (along, lateral) = (stress[(0, 0)] / material.mu, stress[(2, 2)] / material.mu);
+                let corner = mesh.vertex([1.0; 3]);
+                let error = (along - exact / material.mu).abs() / limit.abs();
+                let side = (positions[3 * corner + 2] - across).abs() / across;
+                println!(
+                    "{law:?} ν {poisson}, {} held, stretch {stretch}: P/µ {along:.6}, off by {error:.1e} (published limit {limit}); \
+                     lateral {lateral:.1e}; lateral stretch {across:.6}, off by {side:.1e}; \
+                     out of balance {unbalanced:.1e}",
+                    held.iter().filter(|&&h| h).count(),
+                );
+                // The stress answers a relative rounding of the positions with κ times that.
+                let rounding = IN_THE_SPACE * (material.lambda / material.mu).max(1.0);
+                assert!(unbalanced < rounding * limit.abs().max(1.0));
+                assert!(error < rounding && lateral.abs() < rounding * limit.abs().max(1.0) && side < IN_THE_SPACE);
+                if poisson > 0.4999 {
+                    let error = (along - limit).abs() / limit.abs();
+                    assert!(error < LIMIT, "P/µ differs from the incompressible {limit} by {error:e}");
                 }
             }
         }
