@@ -226,8 +226,10 @@ impl Mesh {
         for element in 0..self.elements.len() {
             let group = self.elements.group(element);
             let near = |v: u32| (self.at(v as usize) - at).norm();
-            let reach = group.iter().map(|&v| (self.at(v as usize) - self.at(group[0] as usize)).norm()).fold(0.0, f64::max);
-            let on_top = NODE_OFFSETS.iter().zip(group).all(|(o, &v)| o[2] != ORDER || self.at(v as usize).z.abs() < GLUE_MM);
+            let reach =
+                group.iter().map(|&v| (self.at(v as usize) - self.at(group[0] as usize)).norm()).fold(0.0, f64::max);
+            let on_top =
+                NODE_OFFSETS.iter().zip(group).all(|(o, &v)| o[2] != ORDER || self.at(v as usize).z.abs() < GLUE_MM);
             if !on_top || near(group[0]) > 1.5 * reach {
                 continue;
             }
@@ -320,10 +322,7 @@ pub enum Law {
 
 /// Lamé constants from Young's modulus and Poisson's ratio.
 pub fn lame(youngs: f64, poisson: f64) -> Lame {
-    Lame {
-        mu: youngs / (2.0 * (1.0 + poisson)),
-        lambda: youngs * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
-    }
+    Lame { mu: youngs / (2.0 * (1.0 + poisson)), lambda: youngs * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)) }
 }
 
 /// A mesh of one material with its supports.
@@ -332,8 +331,6 @@ pub struct Body<'a> {
     law: Law,
     geometry: SolidGeometry,
     materials: Vec<Lame>,
-    /// How Newton's steps are guarded.
-    pub globalization: Globalization,
     dofs: Dofs,
     pattern: Pattern,
     symbolic: SymbolicFactor,
@@ -348,8 +345,7 @@ impl<'a> Body<'a> {
         let pattern = Pattern::new(&dofs, &[&mesh.elements]);
         let symbolic = SymbolicFactor::new(&pattern).expect("analysed");
         let materials = vec![material; mesh.elements.len()];
-        let globalization = Globalization::PredictedStress;
-        Body { mesh, law, geometry, materials, globalization, dofs, pattern, symbolic }
+        Body { mesh, law, geometry, materials, dofs, pattern, symbolic }
     }
 
     pub fn unknowns(&self) -> usize {
@@ -376,7 +372,7 @@ impl<'a> Body<'a> {
             }
         }
         let settings = NewtonSettings {
-            globalization: self.globalization,
+            globalization: Globalization::PredictedStress,
             force_scale_mn,
             tolerance_mn: tolerance * force_scale_mn,
             max_iterations: 50,

@@ -38,7 +38,10 @@ fn thick_sphere_under_inner_pressure() {
                 on.map(|v| (moved(v) - mesh.at(v).normalize() * exact).norm() / exact).fold(0.0, f64::max)
             };
             let (a, b) = (error(1.0, inner), error(2.0, outer));
-            println!("ν {poisson}, {across}² × {through} per block ({} unknowns): worst node {a:.1e} inside, {b:.1e} outside, allowed {MODEST_MESH:.1e}", body.unknowns());
+            println!(
+                "ν {poisson}, {across}² × {through} per block ({} unknowns): worst node {a:.1e} inside, {b:.1e} outside, allowed {MODEST_MESH:.1e}",
+                body.unknowns()
+            );
             assert!(a.max(b) < last, "refinement did not help: {a:e} {b:e} after {last:e}");
             last = a.max(b);
             if across >= 2 {

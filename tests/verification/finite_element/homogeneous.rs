@@ -3,16 +3,14 @@
 use fastrand::Rng;
 use nalgebra::{Matrix3, Vector3};
 use retina_core::effects::finite_strain::{Lame, NeoHookean};
-use retina_core::solve::newton::Globalization;
 use retina_tests::tolerance::IN_THE_SPACE;
 
 use super::block::{Body, Law, Mesh, block, lame};
 
-const LAWS: [Law; 3] =
-    [Law::Linear, Law::NeoHookean(NeoHookean::Logarithmic), Law::NeoHookean(NeoHookean::Isochoric)];
+const LAWS: [Law; 3] = [Law::Linear, Law::NeoHookean(NeoHookean::Logarithmic), Law::NeoHookean(NeoHookean::Isochoric)];
 
 /// Residual of a solve that is to leave nothing but rounding [mN].
-const RESIDUAL: f64 = 1e-11;
+const RESIDUAL: f64 = 1e-10;
 
 fn on_boundary(at: Vector3<f64>) -> bool {
     at.iter().any(|&c| c.abs() < 1e-9 || (c - 1.0).abs() < 1e-9)
@@ -50,7 +48,10 @@ fn an_affine_map_on_the_boundary_is_one_inside() {
             }
             let report = body.solve(&mut positions, &[], 1.0, RESIDUAL);
             let error = positions.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            println!("{law:?} ν {poisson} seed {seed}: {error:.1e} after {} steps, allowed {IN_THE_SPACE:e}", report.iterations);
+            println!(
+                "{law:?} ν {poisson} seed {seed}: {error:.1e} after {} steps, allowed {IN_THE_SPACE:e}",
+                report.iterations
+            );
             assert!(error < IN_THE_SPACE, "{law:?} ν {poisson} seed {seed}: {error:e}");
         }
     }
@@ -90,7 +91,7 @@ fn neo_hookean_uniaxial_and_equibiaxial() {
     // Free faces wrinkle near these stretches (Biot 1963: 0.44 and 0.67 for the incompressible half-space, somewhat earlier for a cube): the
     // homogeneous state is then an equilibrium that no stable path reaches, and the closed form is put in and held against balance.
     const WRINKLED: [f64; 2] = [0.6, 0.75];
-    const STEPS: i32 = 6;
+    const STEPS: i32 = 10;
     let mut rng = Rng::with_seed(7);
     let mesh = distorted_cube(&mut rng);
     for (held, published) in [([true, false, false], UNIAXIAL), ([true, true, false], EQUIBIAXIAL)] {
@@ -100,8 +101,7 @@ fn neo_hookean_uniaxial_and_equibiaxial() {
         {
             let material = lame(1.0, poisson);
             let on_side = |at: Vector3<f64>, k: usize| at[k].abs() < 1e-9 || (held[k] && (at[k] - 1.0).abs() < 1e-9);
-            let mut free = Body::new(&mesh, Law::NeoHookean(law), material, on_side);
-            free.globalization = Globalization::LineSearch;
+            let free = Body::new(&mesh, Law::NeoHookean(law), material, on_side);
             for (stretch, limit) in STRETCHES.into_iter().zip(published) {
                 let across = lateral_stretch(law, material, stretch, held);
                 let all = held.map(|h| if h { stretch } else { across });
@@ -161,7 +161,10 @@ fn neo_hookean_simple_shear() {
             let f = Matrix3::new(1.0, shear, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
             let cauchy = body.mean_stress(&positions) * f.transpose() / material.mu;
             let (along, difference) = (cauchy[(0, 1)], cauchy[(0, 0)] - cauchy[(1, 1)]);
-            println!("{law:?} ν {poisson} γ {shear}: σ12/µ {along:.10} (γ), (σ11 − σ22)/µ {difference:.10} ({:.2})", shear * shear);
+            println!(
+                "{law:?} ν {poisson} γ {shear}: σ12/µ {along:.10} (γ), (σ11 − σ22)/µ {difference:.10} ({:.2})",
+                shear * shear
+            );
             let rounding = IN_THE_SPACE * (material.lambda / material.mu).max(1.0);
             assert!((along - shear).abs() < rounding && (difference - shear * shear).abs() < rounding);
         }

@@ -45,8 +45,9 @@ fn order_with_volume_change() {
             let other = 3 - i - j;
             if i == j { -s.product() } else { c[i] * c[j] * s[other] }
         };
-        let gradient_of_divergence =
-            Vector3::from_fn(|i, _| PI * PI * (0..3).map(|j| b[j] * if i == j { -s.product() } else { second(i, j) }).sum::<f64>());
+        let gradient_of_divergence = Vector3::from_fn(|i, _| {
+            PI * PI * (0..3).map(|j| b[j] * if i == j { -s.product() } else { second(i, j) }).sum::<f64>()
+        });
         b * (3.0 * PI * PI * material.mu * s.product()) - gradient_of_divergence * (material.lambda + material.mu)
     };
     orders("sine bubble", poisson, exact, force);

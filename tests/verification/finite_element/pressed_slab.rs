@@ -94,14 +94,17 @@ fn small_strain_layer() {
 
 #[test]
 fn neo_hookean_slab_under_dead_pressure() {
-    let table = include_str!("../../data/neo_hookean_slab.csv");
+    // Under 5 mN on the bump the pressure reaches Young's modulus: the two tables there moved by 7 % of their depth between meshes (NH-ln) or
+    // show a surface that has creased (NH-iso, u_r inward by a tenth of the thickness). They are no reference and left out.
+    const LARGEST_BUMP_MN: f64 = 2.0;
+    let cases = cases(include_str!("../../data/neo_hookean_slab.csv"), 8, [8, 9, 10, 12]);
     let mut last: Option<(String, Mesh, Vec<f64>)> = None;
-    for (name, rows) in cases(table, 8, [8, 9, 10, 12]) {
-        if name[0] == "capsule" || (name[1] == "NH-iso" && name[6] == "5.0") || (name[6]=="5.0") {
-            continue;
-        }
+    for (name, rows) in &cases {
         let number = |i: usize| name[i].parse::<f64>().expect("a number");
         let (youngs, poisson, thickness, size, force) = (number(2), number(3), number(4), number(5), number(6));
+        if name[0] == "capsule" || (name[0] == "bump" && force > LARGEST_BUMP_MN) {
+            continue;
+        }
         let law = if name[1] == "NH-iso" { NeoHookean::Isochoric } else { NeoHookean::Logarithmic };
         let family = format!("{} {}", name[0], name[1]);
         // Larger forces start from the next smaller one's answer.
@@ -117,14 +120,32 @@ fn neo_hookean_slab_under_dead_pressure() {
         let on = |at: Vector3<f64>| at.z.abs() < 1e-9 && at.xy().norm() < size * (1.0 + 1e-9);
         let load =
             mesh.surface_load(on, |at, _| Vector3::new(0.0, 0.0, -pressure(&name[0], size, force, at.xy().norm())));
-        let report = body.solve(&mut positions, &load, force, 1e-7);
-        let largest = rows.iter().map(|r| r[2].abs()).fold(0.0, f64::max);
-        for [r, ur, uz, change] in rows {
+        body.solve(&mut positions, &load, force, 1e-7);
+        let depth = |rows: &[Row]| rows.iter().map(|r| r[2].abs()).fold(0.0, f64::max);
+        // The NH-iso tables stop at the coarser mesh: what the NH-ln table of the same load still moved from there on, of its depth, is
+        // what theirs may move.
+        let finer =
+            |other: &&(Vec<String>, Vec<Row>)| other.0[0] == name[0] && other.0[1] == "NH-ln" && other.0[6] == name[6];
+        let (_, moved) = cases.iter().find(finer).expect("the same load on NH-ln");
+        // Worst row, by the share of what it is allowed.
+        let mut worst = [0.0; 4];
+        for (&[r, ur, uz, _], still) in rows.iter().zip(moved) {
             let found = at_radius(&mesh, &positions, r);
-            let allowed = NEO_HOOKEAN_TABLE * largest + change.abs();
-            println!("   r {r}: u_r {:.6} ({ur:.6}) u_z {:.6} ({uz:.6}), {:+.2} {:+.2} % of {largest}, allowed {:.2} %", found[0], found[1], 100.0*(found[0]-ur)/largest, 100.0*(found[1]-uz)/largest, 100.0*allowed/largest);
+            let error = (found[0] - ur).abs().max((found[1] - uz).abs()) / depth(rows);
+            let at_edge = name[0] == "disc" && (r - size).abs() < 0.51 * size;
+            let codes = if at_edge { LINEAR_TABLE_EDGE } else { NEO_HOOKEAN_TABLE };
+            let allowed = codes + still[3].abs() / depth(moved);
+            if error / allowed > worst[0] {
+                worst = [error / allowed, r, error, allowed];
+            }
         }
-        println!("{family} {force} mN {report:?}");
+        let [share, r, error, allowed] = worst;
+        println!(
+            "{family} {force} mN: worst at r {r}, {:.2} % of the largest displacement, allowed {:.2}",
+            100.0 * error,
+            100.0 * allowed,
+        );
+        assert!(share < 1.0, "{family} {force} mN at r {r}: {error:e} > {allowed:e}");
         last = Some((family, mesh, positions));
     }
 }
