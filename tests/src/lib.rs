@@ -1,4 +1,5 @@
 //! What the test tiers and the measuring programs share. Sees every package, is seen by none.
 
 pub mod statistics;
+pub mod tolerance;
 pub mod working_range;

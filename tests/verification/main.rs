@@ -1,3 +1,4 @@
 //! Closed forms and published or independently computed values.
 
+mod finite_element;
 mod linear_layer;

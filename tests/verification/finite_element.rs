@@ -1,0 +1,8 @@
+//! The element, the solid energies, the assembly and the solver against closed forms and other people's tables.
+
+mod block;
+mod closed_forms;
+mod homogeneous;
+mod manufactured;
+mod pressed_needle;
+mod pressed_slab;
