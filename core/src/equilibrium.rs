@@ -40,6 +40,15 @@ pub struct ContactSettings {
     pub points_per_edge: usize,
 }
 
+/// Where a mesh stands and how it is graded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshSize {
+    /// The disc around the contact.
+    pub disc: DiscGeometry,
+    /// Thickness of the innermost element of the retina [mm], unless equal elements are thinner.
+    pub first_element_mm: f64,
+}
+
 /// The needle as the wall sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Tool<'a> {
@@ -130,7 +139,7 @@ const MAX_TRAVEL_PER_RADIUS: f64 = 0.25;
 const TOUCH_ITERATIONS: usize = 20;
 
 impl<'a> Wall<'a> {
-    /// Meshes the wall under `surface` over the disc.
+    /// Meshes the wall under `surface`.
     ///
     /// # Errors
     /// If the wall cannot be meshed there.
@@ -138,7 +147,7 @@ impl<'a> Wall<'a> {
         topology: &'a WallTopology,
         surface: &Surface,
         tissue: &Tissue,
-        disc: &DiscGeometry,
+        mesh: &MeshSize,
         solid: Solid,
         contact: ContactSettings,
         tool: Tool<'a>,
@@ -149,9 +158,13 @@ impl<'a> Wall<'a> {
             .map(|named| LayerThickness {
                 thickness_mm: named.layer.thickness_mm,
                 thins: matches!(named.kind, LayerKind::Retina(_)),
+                first_element_mm: match named.kind {
+                    LayerKind::Retina(0) => mesh.first_element_mm,
+                    _ => f64::INFINITY,
+                },
             })
             .collect();
-        let geometry = WallGeometry::new(topology, disc, &thicknesses, |x, y| surface.column(x, y))?;
+        let geometry = WallGeometry::new(topology, &mesh.disc, &thicknesses, |x, y| surface.column(x, y))?;
         let lame = |layer: usize| Lame {
             mu: layers[layer].layer.shear_modulus_kpa(),
             lambda: layers[layer].layer.first_lame_kpa(),

@@ -26,7 +26,7 @@ use crate::scene::{Scene, SceneSurface};
 use crate::solve::newton;
 use beds::Beds;
 use choice::{Decision, Expected, decide};
-use finite_element::{COARSE, ContactEstimate, FiniteElementAnswer, Problem, REFERENCE};
+use finite_element::{Bench, COARSE, ContactEstimate, FiniteElementAnswer, Problem, REFERENCE, Resolution};
 use linear::{LinearAnswer, Load, press};
 use topologies::shared_topology;
 
@@ -90,6 +90,20 @@ impl PreparedScene {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<Prediction, PredictError> {
+        self.predict_at(request, &REFERENCE, workspace, progress)
+    }
+
+    /// As [`PreparedScene::predict`], with `resolution` in place of that of level `reference`: for measuring what refinement changes.
+    ///
+    /// # Errors
+    /// [`PredictError`].
+    pub fn predict_at(
+        &self,
+        request: &Request,
+        resolution: &Resolution,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Prediction, PredictError> {
         progress.stage("linear");
         request.needle.validate()?;
         let body = request.needle.shape.body();
@@ -107,7 +121,7 @@ impl PreparedScene {
             },
             _ => first,
         };
-        question.answer(workspace, progress)
+        question.answer(resolution, workspace, progress)
     }
 
     /// The request in the frame of the patch around `contact`.
@@ -163,7 +177,12 @@ impl Question<'_> {
         }
     }
 
-    fn answer(&self, workspace: &mut Workspace, progress: &mut dyn Progress) -> Result<Prediction, PredictError> {
+    fn answer(
+        &self,
+        resolution: &Resolution,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Prediction, PredictError> {
         let still = Expected { depth_mm: 0.0, strain: 0.0 };
         if self.motion.force_mn == Some(0.0) {
             let decision = decide(&self.request.effects, self.request.level, still)?;
@@ -194,7 +213,7 @@ impl Question<'_> {
         let answer = match self.request.level {
             Level::Linear => self.linear(&linear, strain),
             Level::Coarse => self.coarse(&linear, &decision, workspace, progress)?,
-            Level::Reference => self.reference(&linear, &decision, workspace, progress)?,
+            Level::Reference => self.fine(resolution, &linear, &decision, workspace, progress)?,
         };
         Ok(self.prediction(answer, decision))
     }
@@ -304,45 +323,34 @@ impl Question<'_> {
                 slot.insert((topology.clone(), memory))
             }
         };
+        let mut bench =
+            Bench { level: Level::Coarse.name(), resolution: &COARSE, topology: &topology, workspace: solver };
         let start = self.start(linear);
-        self.problem(decision).solve(
-            Level::Coarse.name(),
-            &COARSE,
-            &topology,
-            &self.estimate(linear),
-            &start,
-            solver,
-            progress,
-        )
+        self.problem(decision).solve(&mut bench, &self.estimate(linear), &start, progress)
     }
 
-    fn reference(
+    /// A finer answer than `coarse`, on a mesh made for the contact that `coarse` finds.
+    fn fine(
         &self,
+        resolution: &Resolution,
         linear: &LinearAnswer,
         decision: &Decision,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
-        // The coarse answer says where the contact ends up; the fine mesh is made for that.
         let coarse = self.coarse(linear, decision, workspace, progress)?;
-        let topology = shared_topology(REFERENCE.division(&self.prepared.scene.tissue))?;
+        let topology = shared_topology(resolution.division(&self.prepared.scene.tissue))?;
         let mut solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
-        let start = self.start(linear);
+        let mut bench =
+            Bench { level: Level::Reference.name(), resolution, topology: &topology, workspace: &mut solver };
         // Travel and start belong together: a needle off by a micrometre opens the contact or closes it with a thousand kPa.
         let aim = ContactEstimate {
             center: coarse.estimate.center,
             radius_mm: coarse.estimate.radius_mm,
             ..self.estimate(linear)
         };
-        let mut answer = self.problem(decision).solve(
-            Level::Reference.name(),
-            &REFERENCE,
-            &topology,
-            &aim,
-            &start,
-            &mut solver,
-            progress,
-        )?;
+        let start = self.start(linear);
+        let mut answer = self.problem(decision).solve(&mut bench, &aim, &start, progress)?;
         answer.solver.iterations += coarse.solver.iterations;
         Ok(answer)
     }

@@ -1,2 +1,7 @@
-//! The service's binary.
-fn main() {}
+//! The program `retina-server`; what it does is in `retina_server::cli`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    retina_server::cli::main()
+}

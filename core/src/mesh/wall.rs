@@ -152,6 +152,9 @@ pub struct LayerThickness {
     pub thickness_mm: f64,
     /// Whether the layer belongs to the retina and thins with it.
     pub thins: bool,
+    /// Thickness of the innermost element, the others growing geometrically; the layer's thickness over the number of elements
+    /// where that is less [mm].
+    pub first_element_mm: f64,
 }
 
 /// Rest positions of one contact's mesh.
@@ -214,14 +217,20 @@ fn levels(topology: &WallTopology, layers: &[LayerThickness]) -> Vec<Level> {
     let mut from_surface = vec![Level::default()];
     let mut top = Level::default();
     for (layer, &count) in layers.iter().zip(&topology.division.elements_per_layer) {
-        let steps = count * ORDER;
-        for step in 1..=steps {
-            let mut level = top;
-            let share = step as f64 / steps as f64;
-            level.layer_coordinate += share;
-            let depth = if layer.thins { &mut level.thinning } else { &mut level.full };
-            *depth += share * layer.thickness_mm;
-            from_surface.push(level);
+        let ratio = growth(layer, count);
+        let total: f64 = (0..count).map(|element| ratio.powi(element as i32)).sum();
+        let mut share = 0.0;
+        for element in 0..count {
+            let part = ratio.powi(element as i32) / total;
+            for step in 1..=ORDER {
+                let mut level = top;
+                let reached = share + part * step as f64 / ORDER as f64;
+                level.layer_coordinate += reached;
+                let depth = if layer.thins { &mut level.thinning } else { &mut level.full };
+                *depth += reached * layer.thickness_mm;
+                from_surface.push(level);
+            }
+            share += part;
         }
         top = from_surface[from_surface.len() - 1];
         top.layer_coordinate = top.layer_coordinate.round();
@@ -229,3 +238,27 @@ fn levels(topology: &WallTopology, layers: &[LayerThickness]) -> Vec<Level> {
     from_surface.reverse();
     from_surface
 }
+
+/// Largest thickness ratio of neighbouring elements: beyond it the outer ones are too flat a start for the inner ones' accuracy.
+const LARGEST_GROWTH: f64 = 3.0;
+
+/// Ratio of each element's thickness to the one inside of it.
+fn growth(layer: &LayerThickness, count: usize) -> f64 {
+    if count < 2 || layer.first_element_mm >= layer.thickness_mm / count as f64 {
+        return 1.0;
+    }
+    let thickness = |ratio: f64| (0..count).map(|e| layer.first_element_mm * ratio.powi(e as i32)).sum::<f64>();
+    let (mut low, mut high) = (1.0, LARGEST_GROWTH);
+    for _ in 0..GROWTH_BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if thickness(middle) < layer.thickness_mm {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Bisections for the growth ratio: far below what a mesh can feel.
+const GROWTH_BISECTIONS: usize = 30;

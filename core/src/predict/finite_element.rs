@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::types::{ContactReport, ContactState, PredictError, SolverReport};
-use crate::equilibrium::{ContactSettings, ContactSummary, Equilibrium, Motion, Solid, Tool, Wall};
+use crate::equilibrium::{ContactSettings, ContactSummary, Equilibrium, MeshSize, Motion, Solid, Tool, Wall};
 use crate::mesh::disc::DiscGeometry;
 use crate::mesh::sample::locate;
 use crate::mesh::wall::{WallDivision, WallTopology};
@@ -40,21 +40,21 @@ pub const COARSE: Resolution = Resolution {
     retina_elements: 1,
     choroid_elements: 1,
     sclera_elements: 0,
-    core_per_contact: 0.8,
-    rim_mm: 1.5,
+    core_per_contact: 1.0,
+    rim_mm: 1.2,
     contact: ContactSettings { stiffness_kpa_per_mm: 5e4, smoothing_mm: 5e-4, points_per_edge: 3 },
 };
 
 /// Level `reference`.
 pub const REFERENCE: Resolution = Resolution {
-    core_cells: 4,
-    rings: 8,
+    core_cells: 3,
+    rings: 12,
     retina_elements: 3,
-    choroid_elements: 2,
+    choroid_elements: 1,
     sclera_elements: 1,
     core_per_contact: 1.0,
     rim_mm: 2.0,
-    contact: ContactSettings { stiffness_kpa_per_mm: 3e5, smoothing_mm: 2e-4, points_per_edge: 3 },
+    contact: ContactSettings { stiffness_kpa_per_mm: 3e5, smoothing_mm: 2e-4, points_per_edge: 4 },
 };
 
 impl Resolution {
@@ -88,6 +88,8 @@ pub struct ContactEstimate {
     pub travel_mm: f64,
 }
 
+/// Thickness of the innermost element of the retina, in contact radii over the number of elements through it.
+const FIRST_ELEMENT_PER_CONTACT: f64 = 2.0;
 /// Smallest contact radius that a mesh is made for, in needle radii.
 const SMALLEST_CONTACT: f64 = 0.05;
 /// The answer of a finite-element level, patch frame.
@@ -106,6 +108,18 @@ pub struct FiniteElementAnswer {
     pub estimate: ContactEstimate,
 }
 
+/// A level's mesh and memory for one prediction.
+pub struct Bench<'a> {
+    /// The level's name, for errors.
+    pub level: &'static str,
+    /// How finely it computes.
+    pub resolution: &'a Resolution,
+    /// The mesh's topology, made for `resolution`.
+    pub topology: &'a WallTopology,
+    /// The solver's memory.
+    pub workspace: &'a mut Workspace,
+}
+
 /// The problem of one prediction, patch frame.
 pub struct Problem<'a> {
     /// The patch.
@@ -121,36 +135,37 @@ pub struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// The disc of a mesh around the estimated contact.
-    fn disc(&self, resolution: &Resolution, estimate: &ContactEstimate) -> DiscGeometry {
+    /// The mesh around the estimated contact.
+    fn mesh(&self, resolution: &Resolution, estimate: &ContactEstimate) -> MeshSize {
         let needle_radius = self.tool.body.radius_mm();
         let contact = estimate.radius_mm.max(SMALLEST_CONTACT * needle_radius);
         let core = resolution.core_per_contact * contact;
         let rim = contact + resolution.rim_mm;
         let ratio = (rim / core).powf(1.0 / resolution.rings as f64);
         let radii = (0..=resolution.rings).map(|ring| core * ratio.powi(ring as i32)).collect();
-        DiscGeometry { center: estimate.center, radii }
+        MeshSize {
+            disc: DiscGeometry { center: estimate.center, radii },
+            first_element_mm: FIRST_ELEMENT_PER_CONTACT * contact / resolution.retina_elements as f64,
+        }
     }
 
-    /// Solves on a mesh of `topology` around the estimated contact, from the displacements `start` (patch parameters and depth in layers
+    /// Solves on a mesh around the estimated contact, from the displacements `start` (patch parameters and depth in layers
     /// in, displacement out).
     ///
     /// # Errors
     /// [`PredictError::Mesh`], [`PredictError::Solver`].
     pub fn solve(
         &self,
-        level: &'static str,
-        resolution: &Resolution,
-        topology: &WallTopology,
+        bench: &mut Bench,
         estimate: &ContactEstimate,
         start: &dyn Fn([f64; 2], f64) -> Vector3<f64>,
-        workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
         progress.stage("mesh");
-        let disc = self.disc(resolution, estimate);
+        let Bench { level, resolution, topology, workspace } = bench;
+        let mesh = self.mesh(resolution, estimate);
         let wall =
-            Wall::new(topology, &self.patch.surface, self.tissue, &disc, self.solid, resolution.contact, self.tool)?;
+            Wall::new(topology, &self.patch.surface, self.tissue, &mesh, self.solid, resolution.contact, self.tool)?;
         let touch_mm = wall.touch(&self.motion.direction, estimate.touch_mm).unwrap_or(estimate.touch_mm);
         let motion = match self.motion.force_mn {
             Some(force_mn) => {
@@ -167,7 +182,7 @@ impl Problem<'_> {
         progress.stage("equilibrium");
         let equilibrium = wall
             .solve(&motion, touch_mm, positions, workspace, progress)
-            .map_err(|cause| PredictError::Solver { level, cause })?;
+            .map_err(|cause| PredictError::Solver { level: *level, cause })?;
         progress.stage("surface");
         Ok(self.answer(&wall, &equilibrium, touch_mm))
     }

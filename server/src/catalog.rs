@@ -1,0 +1,146 @@
+//! What there is to choose from, told from the core's own tables.
+
+use retina_core::needle::shape::{BEVEL_ANGLE, EDGE_RADIUS, RADIUS};
+use retina_core::needle::{GAUGES, TIP_COORDINATE};
+use retina_core::patch::{NODES_PER_SIDE, SPACING_MM};
+use retina_core::predict::Level;
+use retina_core::range::ParameterRange;
+use retina_core::scene::{Scene, SceneSurface};
+use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
+use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA};
+use retina_core::tissue::{Layer, Tissue};
+
+use crate::understand::{DEFAULT_GAUGE, DEFAULT_LEVEL, DEFAULT_SCENE, FORCE};
+use crate::wire::catalog::{
+    GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
+};
+use crate::wire::scene::{LayerSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec};
+
+/// The built-in scenes, and every parameter with its range.
+pub fn scenes() -> SceneList {
+    let entry = |&name: &&'static str| Some(SceneEntry { name, scene: spec(&Scene::built_in(name)?) });
+    SceneList {
+        default: DEFAULT_SCENE,
+        scenes: Scene::built_in_names().iter().filter_map(entry).collect(),
+        patch: PatchEntry {
+            nodes_per_side: NODES_PER_SIDE,
+            spacing_mm: SPACING_MM,
+            size_mm: SPACING_MM * (NODES_PER_SIDE - 1) as f64,
+        },
+        parameters: parameters(),
+    }
+}
+
+/// The levels, cheapest first.
+pub fn levels() -> LevelList {
+    let entry = |level: Level| {
+        let (what, cost) = match level {
+            Level::Linear => {
+                ("layered linear elasticity and a contact law, prepared once per scene", "tens of microseconds")
+            }
+            Level::Coarse => ("finite elements on a mesh that fits in milliseconds", "milliseconds"),
+            Level::Reference => ("finite elements on the converged mesh", "seconds"),
+        };
+        LevelEntry { name: level.name(), what, cost }
+    };
+    LevelList { default: DEFAULT_LEVEL.name(), levels: Level::ALL.map(entry).into() }
+}
+
+/// The gauges, thin to thick.
+pub fn gauges() -> GaugeList {
+    let gauges = GAUGES.map(|gauge| GaugeEntry {
+        name: gauge.name,
+        outer_diameter_mm: gauge.outer_diameter_mm,
+        source: gauge.source,
+    });
+    GaugeList { default: DEFAULT_GAUGE, gauges: gauges.into() }
+}
+
+/// A scene as a request would write it out.
+fn spec(scene: &Scene) -> SceneSpec {
+    let mut surface = SurfaceSpec {
+        kind: SurfaceKind::Flat,
+        radius_mm: None,
+        depth_mm: None,
+        sigma_mm: None,
+        vertices_mm: None,
+        triangles: None,
+        obj: None,
+        ply: None,
+    };
+    match scene.surface {
+        SceneSurface::Flat => {}
+        SceneSurface::Sphere { radius_mm } => {
+            (surface.kind, surface.radius_mm) = (SurfaceKind::Sphere, Some(radius_mm));
+        }
+        SceneSurface::FovealPit { radius_mm, depth_mm, sigma_mm } => {
+            (surface.kind, surface.radius_mm) = (SurfaceKind::FovealPit, Some(radius_mm));
+            (surface.depth_mm, surface.sigma_mm) = (Some(depth_mm), Some(sigma_mm));
+        }
+        SceneSurface::Mesh(_) => surface.kind = SurfaceKind::Mesh,
+    }
+    SceneSpec { surface: Some(surface), tissue: Some(tissue(&scene.tissue)), pose: None }
+}
+
+fn tissue(tissue: &Tissue) -> TissueSpec {
+    let layer = |layer: &Layer| LayerSpec {
+        thickness_mm: Some(layer.thickness_mm),
+        youngs_modulus_kpa: Some(layer.youngs_modulus_kpa),
+        poisson_ratio: Some(layer.poisson_ratio),
+    };
+    let retina = match tissue.retina.as_slice() {
+        [whole] => RetinaSpec::Whole(layer(whole)),
+        sublayers => RetinaSpec::Sublayers(sublayers.iter().map(layer).collect()),
+    };
+    TissueSpec {
+        inner_limiting_membrane: tissue.inner_limiting_membrane.as_ref().map(layer),
+        retina: Some(retina),
+        choroid: Some(layer(&tissue.choroid)),
+        sclera: Some(layer(&tissue.sclera)),
+    }
+}
+
+fn parameters() -> Vec<ParameterEntry> {
+    let single = [
+        ("force_mn", &FORCE),
+        ("needle.tip_mm", &TIP_COORDINATE),
+        ("needle.radius_mm", &RADIUS),
+        ("needle.tip.flat.edge_radius_mm", &EDGE_RADIUS),
+        ("needle.tip.bevelled.edge_radius_mm", &EDGE_RADIUS),
+        ("needle.tip.bevelled.angle_deg", &BEVEL_ANGLE),
+        ("scene.surface.radius_mm", &EYE_RADIUS),
+        ("scene.surface.depth_mm", &PIT_DEPTH),
+        ("scene.surface.sigma_mm", &PIT_SIGMA),
+        ("scene.pose.position_mm", &TIP_COORDINATE),
+    ];
+    let layers = [
+        ("inner_limiting_membrane", &INNER_LIMITING_MEMBRANE),
+        ("retina", &RETINA),
+        ("retina[]", &RETINA_SUBLAYER),
+        ("choroid", &CHOROID),
+        ("sclera", &SCLERA),
+    ];
+    let single = single.into_iter().map(|(field, range)| parameter(field.to_owned(), range));
+    single.chain(layers.into_iter().flat_map(|(name, ranges)| layer_parameters(name, ranges))).collect()
+}
+
+fn layer_parameters(layer: &str, ranges: &LayerRanges) -> [ParameterEntry; 3] {
+    [
+        ("thickness_mm", &ranges.thickness),
+        ("youngs_modulus_kpa", &ranges.youngs_modulus),
+        ("poisson_ratio", &ranges.poisson_ratio),
+    ]
+    .map(|(number, range)| parameter(format!("scene.tissue.{layer}.{number}"), range))
+}
+
+fn parameter(field: String, range: &ParameterRange) -> ParameterEntry {
+    ParameterEntry {
+        field,
+        name: range.name,
+        unit: range.unit,
+        default: range.default,
+        min: range.min,
+        max: range.max,
+        source: range.source,
+    }
+}

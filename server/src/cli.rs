@@ -1,0 +1,164 @@
+//! The program: serve, or answer one request from a file.
+//!
+//! Contract of `predict`: the response goes to standard output and is that of `POST /v1/predict`; a problem goes to standard error as the
+//! same document that HTTP has, and the program ends with 1. The command line is at fault: 2.
+
+use std::fs;
+use std::io::{self, IsTerminal as _, Read, Write};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use clap::Parser as _;
+use retina_core::predict::{PreparedScene, Workspace};
+use retina_core::progress::Progress as _;
+use retina_core::scene::{Scene, SceneSurface};
+use retina_core::surface::mesh_file::{MeshFormat, read_mesh};
+use tokio_util::sync::CancellationToken;
+use tracing_subscriber::EnvFilter;
+
+use crate::answer::predict;
+use crate::config::{Command, CommandLine, Config, LogForm, PredictArgs};
+use crate::problem::{Kind, Problem, from_predict};
+use crate::read::read;
+use crate::stopwatch::Stopwatch;
+use crate::understand;
+use crate::wire::PredictRequest;
+use crate::write::Layout;
+use crate::{App, run};
+
+/// Where the program reads from and writes to.
+pub struct Streams<'a> {
+    /// Standard input.
+    pub input: &'a mut dyn Read,
+    /// Standard output.
+    pub output: &'a mut dyn Write,
+    /// Standard error.
+    pub problems: &'a mut dyn Write,
+}
+
+/// Runs the program as its command line says.
+pub fn main() -> ExitCode {
+    let CommandLine { command, config } = CommandLine::parse();
+    match command {
+        Some(Command::Predict(args)) => {
+            let streams = Streams { input: &mut io::stdin(), output: &mut io::stdout(), problems: &mut io::stderr() };
+            match predict_file(&args, streams) {
+                Ok(code) => ExitCode::from(code),
+                Err(_) => ExitCode::FAILURE,
+            }
+        }
+        Some(Command::Serve(config)) => serve(&config),
+        None => serve(&config),
+    }
+}
+
+fn serve(config: &Config) -> ExitCode {
+    start_log(config.log);
+    match serve_until_ctrl_c(config) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            tracing::error!(%error, listen = %config.listen, "the service ended");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// One thread talks: the numerical threads do the work, and handing it to one of several talking threads costs a wake-up more.
+#[tokio::main(flavor = "current_thread")]
+async fn serve_until_ctrl_c(config: &Config) -> io::Result<()> {
+    let listener = tokio::net::TcpListener::bind(config.listen).await?;
+    let address = listener.local_addr()?;
+    tracing::info!("listening on http://{address}, try http://{address}/docs");
+    let shutdown = CancellationToken::new();
+    let stop = shutdown.clone();
+    tokio::spawn(async move {
+        // Without a way to hear of ctrl-c the service runs on, as it must.
+        if tokio::signal::ctrl_c().await.is_ok() {
+            tracing::info!("stopping after what was accepted");
+            stop.cancel();
+        }
+    });
+    run(listener, App::start(config)?, shutdown).await
+}
+
+fn start_log(form: LogForm) {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+    let log = tracing_subscriber::fmt().with_writer(io::stderr).with_env_filter(filter);
+    match form {
+        LogForm::Pretty => log.with_ansi(io::stderr().is_terminal()).init(),
+        LogForm::Json => log.json().init(),
+    }
+}
+
+/// `retina-server predict`; returns the exit code.
+///
+/// # Errors
+/// If a stream cannot be written.
+pub fn predict_file(args: &PredictArgs, streams: Streams) -> io::Result<u8> {
+    let body = match read_input(&args.request, streams.input) {
+        Ok(body) => body,
+        Err(error) => {
+            writeln!(streams.problems, "{}: {error}", args.request.display())?;
+            return Ok(2);
+        }
+    };
+    let layout = match args.pretty {
+        true => Layout::Indented,
+        false => Layout::Compact,
+    };
+    match answer(&body, args.mesh.as_deref(), layout) {
+        Ok(answer) => {
+            streams.output.write_all(&answer)?;
+            streams.output.write_all(b"\n")?;
+            Ok(0)
+        }
+        Err(problem) => {
+            serde_json::to_writer_pretty(&mut *streams.problems, &problem.document())?;
+            writeln!(streams.problems)?;
+            Ok(1)
+        }
+    }
+}
+
+fn read_input(path: &Path, input: &mut dyn Read) -> io::Result<Vec<u8>> {
+    if path == Path::new("-") {
+        let mut bytes = Vec::new();
+        input.read_to_end(&mut bytes)?;
+        return Ok(bytes);
+    }
+    fs::read(path)
+}
+
+fn answer(body: &[u8], mesh: Option<&Path>, layout: Layout) -> Result<Vec<u8>, Problem> {
+    let mut stopwatch = Stopwatch::start(Instant::now(), Duration::MAX / 4, &|| false);
+    let message: PredictRequest = read(body)?;
+    let request = understand::request(&message)?;
+    let mut scene = understand::chosen(message.scene.as_ref())?;
+    if let Some(path) = mesh {
+        replace_surface(&mut scene, path)?;
+    }
+    stopwatch.stage("prepare");
+    let scene = PreparedScene::new(scene).map_err(from_predict)?;
+    predict(&scene, &request, &mut Workspace::default(), &mut stopwatch, layout)
+}
+
+fn replace_surface(scene: &mut Scene, path: &Path) -> Result<(), Problem> {
+    let refuse = |allowed: &str, reason: String| {
+        let detail = format!("{}: {reason}", path.display());
+        Problem::field(Kind::InvalidMesh, "--mesh", None, allowed, detail)
+    };
+    let format = match path.extension().and_then(|extension| extension.to_str()) {
+        Some("ply") => MeshFormat::Ply,
+        Some("obj") => MeshFormat::Obj,
+        _ => {
+            return Err(refuse("a file named .ply or .obj", "unknown format".to_owned()));
+        }
+    };
+    let bytes = fs::read(path).map_err(|error| refuse("a file that can be read", error.to_string()))?;
+    let mesh = read_mesh(&bytes, format)
+        .map_err(|error| refuse("a triangle mesh in mm with a common outward side", error.to_string()))?;
+    scene.surface = SceneSurface::Mesh(Arc::new(mesh));
+    Ok(())
+}

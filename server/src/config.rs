@@ -1,0 +1,92 @@
+//! What the program can be told, on the command line or by environment variables. The only place that reads either.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::thread::available_parallelism;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Needle pose and force in, deformed retina surface and normals out.
+#[derive(Debug, Parser)]
+#[command(name = "retina-server", version, args_conflicts_with_subcommands = true)]
+pub struct CommandLine {
+    /// What to do; serve when left out.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// How to serve.
+    #[command(flatten)]
+    pub config: Config,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Answer requests over HTTP (the default).
+    Serve(Config),
+    /// Answer one request from a file and end: the response goes to standard output, a problem to standard error.
+    Predict(PredictArgs),
+}
+
+/// How to serve.
+#[derive(Clone, Debug, Args)]
+pub struct Config {
+    /// Address and port to listen on; port 0 takes a free one.
+    #[arg(long, env = "RETINA_LISTEN", default_value = "127.0.0.1:8080")]
+    pub listen: SocketAddr,
+    /// Numerical threads; as many as the machine has cores when left out.
+    #[arg(long, env = "RETINA_THREADS", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// Requests that may wait for a numerical thread; one more is answered with 503.
+    #[arg(long, env = "RETINA_QUEUE", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
+    pub queue: u16,
+    /// Memory for the prepared scenes of requests, MiB. The built-in ones come on top.
+    #[arg(long, env = "RETINA_SCENE_CACHE_MIB", default_value_t = 64)]
+    pub scene_cache_mib: u16,
+    /// Milliseconds after which the work on a request is stopped.
+    #[arg(long, env = "RETINA_TIME_LIMIT_MS", default_value_t = 30_000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub time_limit_ms: u32,
+    /// Form of the log on standard error. RUST_LOG says what is logged; `retina_server=debug` has a line for each request.
+    #[arg(long, env = "RETINA_LOG", default_value = "pretty")]
+    pub log: LogForm,
+}
+
+/// Form of the log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LogForm {
+    /// For people.
+    Pretty,
+    /// One JSON object a line.
+    Json,
+}
+
+/// One request without HTTP.
+#[derive(Debug, Args)]
+pub struct PredictArgs {
+    /// File with the request that `POST /v1/predict` takes; `-` is standard input.
+    pub request: PathBuf,
+    /// A mesh in mm (.ply, text or binary, or .obj) in place of the scene's surface.
+    #[arg(long)]
+    pub mesh: Option<PathBuf>,
+    /// One line for each field.
+    #[arg(long)]
+    pub pretty: bool,
+}
+
+impl Config {
+    /// Numerical threads.
+    pub fn threads(&self) -> usize {
+        let cores = || available_parallelism().map_or(1, usize::from);
+        self.threads.map_or_else(cores, usize::from)
+    }
+
+    /// Memory for the prepared scenes of requests, bytes.
+    pub fn scene_cache_bytes(&self) -> usize {
+        usize::from(self.scene_cache_mib) << 20
+    }
+
+    /// How long the work on a request may take.
+    pub fn time_limit(&self) -> Duration {
+        Duration::from_millis(self.time_limit_ms.into())
+    }
+}

@@ -1,0 +1,116 @@
+//! What each route does. The URLs stand in `routes`; the work is done elsewhere.
+
+use axum::Json;
+use axum::body::Body;
+use axum::extract::rejection::PathRejection;
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, Method, Uri, header};
+use axum::response::{Html, IntoResponse, Response};
+
+use crate::catalog;
+use crate::problem::{Kind, MEDIA_TYPE, Problem, ProblemDocument};
+use crate::state::AppState;
+use crate::wire::{GaugeList, LevelList, PredictRequest, PredictResponse, Readiness, SceneList};
+
+/// What the surface looks like when a needle at this pose pushes with this force.
+#[utoipa::path(
+    post,
+    path = "/v1/predict",
+    tag = "predict",
+    request_body = PredictRequest,
+    responses(
+        (status = 200, description = "The deformed surface", body = PredictResponse<'static>),
+        (status = 400, description = "Not JSON", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 408, description = "The body did not arrive in time", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 413, description = "Larger than 8 MiB", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 415, description = "Not announced as JSON", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 422, description = "A field is wrong, or there is no answer", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 500, description = "A fault of the server", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 503, description = "Too much work is waiting, or it took too long", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+    )
+)]
+pub async fn predict(State(app): State<AppState>, headers: HeaderMap, body: Body) -> Result<Response, Problem> {
+    let answer = app.answer(&headers, body).await?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], answer).into_response())
+}
+
+/// The built-in scenes, and every parameter of a scene with its default, range and source.
+#[utoipa::path(get, path = "/v1/scenes", tag = "catalog", responses((status = 200, body = SceneList)))]
+pub async fn scenes() -> Json<SceneList> {
+    Json(catalog::scenes())
+}
+
+/// The levels of accuracy, cheapest first.
+#[utoipa::path(get, path = "/v1/levels", tag = "catalog", responses((status = 200, body = LevelList)))]
+pub async fn levels() -> Json<LevelList> {
+    Json(catalog::levels())
+}
+
+/// The needles that have a name.
+#[utoipa::path(get, path = "/v1/gauges", tag = "catalog", responses((status = 200, body = GaugeList)))]
+pub async fn gauges() -> Json<GaugeList> {
+    Json(catalog::gauges())
+}
+
+/// Whether the service runs.
+#[utoipa::path(get, path = "/healthz", tag = "service", responses((status = 200, body = Readiness)))]
+pub async fn health() -> Json<Readiness> {
+    Json(Readiness { status: "ok" })
+}
+
+/// Whether the built-in scenes are prepared.
+#[utoipa::path(
+    get,
+    path = "/readyz",
+    tag = "service",
+    responses(
+        (status = 200, body = Readiness),
+        (status = 503, description = "Warming up", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+    )
+)]
+pub async fn ready(State(app): State<AppState>) -> Result<Json<Readiness>, Problem> {
+    app.ready()?;
+    Ok(Json(Readiness { status: "ready" }))
+}
+
+/// What a kind of problem means.
+#[utoipa::path(
+    get,
+    path = "/problems/{name}",
+    tag = "service",
+    params(("name" = String, Path, description = "The last part of a problem's `type`")),
+    responses(
+        (status = 200, body = String, content_type = "text/plain"),
+        (status = 404, description = "No such problem", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+    )
+)]
+pub async fn problem(name: Result<Path<String>, PathRejection>) -> Result<String, Problem> {
+    // A name that is not UTF-8 is none of ours either.
+    let name = name.map_or_else(|_| String::new(), |Path(name)| name);
+    let kind = Kind::ALL.iter().find(|kind| kind.name() == name);
+    let kind = kind.ok_or_else(|| {
+        let known: Vec<&str> = Kind::ALL.iter().map(|kind| kind.name()).collect();
+        Problem::new(Kind::NotFound, format!("There is no such problem; known are {}.", known.join(", ")))
+    })?;
+    Ok(format!("{} ({})\n\n{}\n", kind.title(), kind.status(), kind.explanation()))
+}
+
+/// A page that links to what there is.
+pub async fn index() -> Html<&'static str> {
+    Html(include_str!("../assets/index.html"))
+}
+
+/// For a URL that there is not.
+pub async fn not_found(uri: Uri) -> Problem {
+    Problem::new(Kind::NotFound, format!("There is no page {}.", uri.path()))
+}
+
+/// For a method that the URL does not take; axum adds the header that lists those it does.
+pub async fn method_not_allowed(method: Method, uri: Uri) -> Problem {
+    Problem::new(Kind::MethodNotAllowed, format!("{} does not take {method}.", uri.path()))
+}
+
+/// For a handler that panicked: nothing of the panic reaches the caller.
+pub fn panicked(_panic: Box<dyn std::any::Any + Send>) -> Response {
+    Problem::internal("a handler panicked").into_response()
+}

@@ -1,0 +1,84 @@
+//! Every kind of problem: its address, status, title and explanation, in one table.
+
+use axum::http::StatusCode;
+
+macro_rules! kinds {
+    ($($kind:ident = $name:literal, $status:ident, $title:literal, $explanation:literal;)*) => {
+        /// A kind of problem.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Kind { $(#[doc = $title] $kind,)* }
+
+        impl Kind {
+            /// Every kind.
+            pub const ALL: &'static [Kind] = &[$(Kind::$kind,)*];
+
+            /// The last part of the kind's address, `/problems/{name}`.
+            pub fn name(self) -> &'static str {
+                match self { $(Kind::$kind => $name,)* }
+            }
+
+            /// The status of a response that tells of it.
+            pub fn status(self) -> StatusCode {
+                match self { $(Kind::$kind => StatusCode::$status,)* }
+            }
+
+            /// What it is, in a few words that never change.
+            pub fn title(self) -> &'static str {
+                match self { $(Kind::$kind => $title,)* }
+            }
+
+            /// What it means and what to do about it.
+            pub fn explanation(self) -> &'static str {
+                match self { $(Kind::$kind => $explanation,)* }
+            }
+        }
+    };
+}
+
+kinds! {
+    MalformedJson = "malformed-json", BAD_REQUEST, "The body is not JSON",
+        "The body ends early or does not follow RFC 8259. `detail` says in which line and column. JSON has no NaN and no infinity.";
+    InvalidRequest = "invalid-request", UNPROCESSABLE_ENTITY, "The body is not a request",
+        "A field is unknown, missing, of the wrong type, or two fields contradict each other. `errors` names it. The schema of every \
+         field is at /openapi.json, and /docs shows it.";
+    OutOfRange = "out-of-range", UNPROCESSABLE_ENTITY, "A number is outside its range",
+        "`errors` names the field, the value and the allowed range, bounds included. GET /v1/scenes lists the ranges of a scene with \
+         their sources. Values are refused, never moved.";
+    UnknownName = "unknown-name", UNPROCESSABLE_ENTITY, "There is nothing of that name",
+        "A scene, gauge, level or effect that does not exist, or that the level cannot do. `errors` lists the known ones.";
+    NotSupported = "not-supported", UNPROCESSABLE_ENTITY, "Not supported by this version",
+        "The field is planned and has no effect yet, so it is refused instead of ignored.";
+    PointsAway = "points-away", UNPROCESSABLE_ENTITY, "The needle or the force points away from the tissue",
+        "Needle and force must point into the tissue: +z of the patch frame is the vitreous, so a needle pushes towards -z. `errors` \
+         says by how much the direction is off.";
+    OutsidePatch = "outside-patch", UNPROCESSABLE_ENTITY, "The needle meets the tissue outside of the patch",
+        "The contact must lie on the patch: move the needle's tip, or the scene's pose, or give a larger mesh.";
+    BeyondPuncture = "beyond-puncture", UNPROCESSABLE_ENTITY, "The force would puncture the tissue",
+        "The tissue model holds up to a pressure under the needle. Use a smaller force or a thicker needle.";
+    TooDeep = "too-deep", UNPROCESSABLE_ENTITY, "The needle stands too deep in the tissue",
+        "Under pose control the needle may be pressed in no deeper than the tissue model holds.";
+    InvalidMesh = "invalid-mesh", UNPROCESSABLE_ENTITY, "The surface cannot be used",
+        "The mesh is malformed, is not the surface of one side, or leaves no room for a patch or for the tissue under it. `detail` says \
+         which vertex or triangle.";
+    NoEquilibrium = "no-equilibrium", UNPROCESSABLE_ENTITY, "No equilibrium was found",
+        "The solver did not converge, and an unconverged state is never an answer. `detail` has the residual. A smaller force, a \
+         stiffer tissue or another level may help.";
+    NotFound = "not-found", NOT_FOUND, "There is no such page",
+        "GET / links to what there is.";
+    MethodNotAllowed = "method-not-allowed", METHOD_NOT_ALLOWED, "The page does not take this method",
+        "The header Allow lists the methods that it takes.";
+    RequestTimeout = "request-timeout", REQUEST_TIMEOUT, "The body did not arrive in time",
+        "The body of a request must arrive within ten seconds.";
+    BodyTooLarge = "body-too-large", PAYLOAD_TOO_LARGE, "The body is too large",
+        "A body may have 8 MiB. Thin out the mesh, or cut it around the needle: the nodes are the 64 vertices nearest to the contact.";
+    UnsupportedMediaType = "unsupported-media-type", UNSUPPORTED_MEDIA_TYPE, "The body is not announced as JSON",
+        "Send the header Content-Type: application/json.";
+    Busy = "busy", SERVICE_UNAVAILABLE, "Too much work is waiting",
+        "The queue of the numerical threads is full. Try again after the seconds in the header Retry-After.";
+    TookTooLong = "took-too-long", SERVICE_UNAVAILABLE, "The answer took too long",
+        "The work was stopped at the time limit of the server. Use a cheaper level.";
+    NotReady = "not-ready", SERVICE_UNAVAILABLE, "The service is warming up",
+        "The built-in scenes are being prepared. Requests are accepted already; the first ones wait.";
+    Internal = "internal", INTERNAL_SERVER_ERROR, "The server failed",
+        "A fault of the server, which its log describes under the request's x-request-id.";
+}

@@ -1,0 +1,67 @@
+//! Every URL of the service, and what surrounds all of them.
+
+use std::time::Duration;
+
+use axum::http::{HeaderName, Request, Response};
+use axum::routing::get;
+use axum::{Json, Router};
+use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
+use tower_http::trace::TraceLayer;
+use tracing::Span;
+use utoipa::OpenApi;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+use utoipa_swagger_ui::SwaggerUi;
+
+use crate::handlers;
+use crate::state::AppState;
+
+const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+
+#[derive(OpenApi)]
+#[openapi(info(
+    title = "Retina",
+    description = "A needle at this pose pushes the retina with this force: what does the surface look like now?\n\n\
+                   Units everywhere: mm, mN, kPa; errors in µm, times in µs. Patch frame: origin on the inner retinal surface, +z into the \
+                   vitreous, so a needle pushes towards -z. Quaternions are x, y, z, w; a needle points along its own -z."
+))]
+struct Description;
+
+/// The service: state in, router out.
+pub fn app(state: AppState) -> Router {
+    let (routes, api) = OpenApiRouter::with_openapi(Description::openapi())
+        .routes(routes!(handlers::predict))
+        .routes(routes!(handlers::scenes))
+        .routes(routes!(handlers::levels))
+        .routes(routes!(handlers::gauges))
+        .routes(routes!(handlers::health))
+        .routes(routes!(handlers::ready))
+        .routes(routes!(handlers::problem))
+        .split_for_parts();
+    let docs = utoipa_swagger_ui::Config::from("/openapi.json").validator_url("none");
+    let trace = TraceLayer::new_for_http()
+        .make_span_with(span)
+        .on_request(())
+        .on_response(|response: &Response<_>, latency: Duration, _span: &Span| {
+            let status = response.status().as_u16();
+            tracing::debug!(status, latency_us = latency.as_micros(), "answered");
+        })
+        .on_failure(());
+    routes
+        .route("/", get(handlers::index))
+        .route("/openapi.json", get(|| async { Json(api) }))
+        .merge(SwaggerUi::new("/docs").config(docs))
+        .fallback(handlers::not_found)
+        .method_not_allowed_fallback(handlers::method_not_allowed)
+        .with_state(state)
+        .layer(CatchPanicLayer::custom(handlers::panicked))
+        .layer(PropagateRequestIdLayer::new(REQUEST_ID))
+        .layer(trace)
+        .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))
+}
+
+fn span<B>(request: &Request<B>) -> Span {
+    let id = request.headers().get(REQUEST_ID).and_then(|id| id.to_str().ok()).unwrap_or_default();
+    tracing::info_span!("request", id, method = %request.method(), path = request.uri().path())
+}

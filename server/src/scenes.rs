@@ -1,0 +1,160 @@
+//! Prepared scenes, kept: the built-in ones for good, those of requests as long as they fit.
+//!
+//! Contract: a scene is prepared once, even when several requests bring it at the same time; the key of a scene is its whole content
+//! as canonical JSON, so that two scenes are never confused; above the limit the one that was unused for longest goes first, and
+//! one that is in use stays.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use retina_core::predict::PreparedScene;
+use retina_core::scene::Scene;
+
+use crate::problem::{Problem, from_predict};
+use crate::understand::{self, DEFAULT_SCENE};
+use crate::wire::SceneSpec;
+use crate::wire::request::SceneChoice;
+
+/// Scenes of requests that are kept, however small: each is looked at when room is made.
+const MOST_INLINE: usize = 256;
+
+/// A place for a scene. Its lock is held while the scene is prepared, so whoever wants the same scene waits for it.
+type Slot = Mutex<Option<Arc<PreparedScene>>>;
+
+/// The prepared scenes.
+pub struct Scenes {
+    built_in: Vec<(&'static str, Slot)>,
+    inline: Mutex<Inline>,
+    limit_bytes: usize,
+}
+
+#[derive(Default)]
+struct Inline {
+    entries: HashMap<Vec<u8>, Entry>,
+    uses: u64,
+}
+
+struct Entry {
+    slot: Arc<Slot>,
+    last_use: u64,
+}
+
+impl Scenes {
+    /// Nothing is prepared yet; scenes of requests are kept up to `limit_bytes`.
+    pub fn new(limit_bytes: usize) -> Self {
+        let slot = |&name| (name, Slot::default());
+        Self { built_in: Scene::built_in_names().iter().map(slot).collect(), inline: Mutex::default(), limit_bytes }
+    }
+
+    /// The scene that a request chooses, prepared.
+    ///
+    /// # Errors
+    /// A problem that names the field.
+    pub fn get(&self, choice: Option<&SceneChoice>) -> Result<Arc<PreparedScene>, Problem> {
+        match choice {
+            None => self.built_in(DEFAULT_SCENE),
+            Some(SceneChoice::Name(name)) => self.built_in(name),
+            Some(SceneChoice::Inline(spec)) => self.inline(spec),
+        }
+    }
+
+    fn built_in(&self, name: &str) -> Result<Arc<PreparedScene>, Problem> {
+        let scene = || understand::built_in(name);
+        match self.built_in.iter().find(|(known, _)| *known == name) {
+            Some((_, slot)) => fill(slot, scene),
+            None => scene().and_then(prepare),
+        }
+    }
+
+    fn inline(&self, spec: &SceneSpec) -> Result<Arc<PreparedScene>, Problem> {
+        let key = serde_json::to_vec(spec).map_err(Problem::internal)?;
+        let slot = self.slot(&key);
+        let prepared = fill(&slot, || understand::scene(spec));
+        drop(slot);
+        self.tidy(&key);
+        prepared
+    }
+
+    fn slot(&self, key: &[u8]) -> Arc<Slot> {
+        let mut inline = lock(&self.inline);
+        inline.uses += 1;
+        let last_use = inline.uses;
+        if let Some(entry) = inline.entries.get_mut(key) {
+            entry.last_use = last_use;
+            return Arc::clone(&entry.slot);
+        }
+        let slot = Arc::<Slot>::default();
+        let entry = Entry { slot: Arc::clone(&slot), last_use };
+        inline.entries.insert(key.to_vec(), entry);
+        slot
+    }
+
+    /// Forgets the scene of `key` if it could not be prepared, and what is too much.
+    fn tidy(&self, key: &[u8]) {
+        let mut inline = lock(&self.inline);
+        if inline.entries.get(key).is_some_and(|entry| entry.idle_bytes() == Some(0)) {
+            inline.entries.remove(key);
+        }
+        while inline.entries.len() > MOST_INLINE || inline.bytes() > self.limit_bytes {
+            let idle = inline.entries.iter().filter(|(_, entry)| entry.idle_bytes().is_some());
+            let Some((oldest, _)) = idle.min_by_key(|(_, entry)| entry.last_use) else {
+                return;
+            };
+            let oldest = oldest.clone();
+            inline.entries.remove(&oldest);
+        }
+    }
+
+    /// Memory of the scenes of requests, keys included, bytes.
+    pub fn inline_bytes(&self) -> usize {
+        lock(&self.inline).bytes()
+    }
+}
+
+impl Inline {
+    fn bytes(&self) -> usize {
+        self.entries.iter().map(|(key, entry)| key.len() + entry.bytes()).sum()
+    }
+}
+
+impl Entry {
+    /// Zero for a scene that is being prepared.
+    fn bytes(&self) -> usize {
+        match self.slot.try_lock() {
+            Ok(slot) => slot.as_ref().map_or(0, |prepared| prepared.memory_bytes()),
+            Err(_) => 0,
+        }
+    }
+
+    /// The bytes of a scene that nobody uses; `None` where somebody does.
+    fn idle_bytes(&self) -> Option<usize> {
+        if Arc::strong_count(&self.slot) > 1 {
+            return None;
+        }
+        let slot = lock(&self.slot);
+        match slot.as_ref() {
+            None => Some(0),
+            Some(prepared) if Arc::strong_count(prepared) == 1 => Some(prepared.memory_bytes()),
+            Some(_) => None,
+        }
+    }
+}
+
+fn fill(slot: &Slot, scene: impl FnOnce() -> Result<Scene, Problem>) -> Result<Arc<PreparedScene>, Problem> {
+    let mut place = lock(slot);
+    if let Some(prepared) = place.as_ref() {
+        return Ok(Arc::clone(prepared));
+    }
+    let prepared = prepare(scene()?)?;
+    *place = Some(Arc::clone(&prepared));
+    Ok(prepared)
+}
+
+fn prepare(scene: Scene) -> Result<Arc<PreparedScene>, Problem> {
+    PreparedScene::new(scene).map(Arc::new).map_err(from_predict)
+}
+
+/// A panic while a scene was prepared leaves its place empty, which is in order.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

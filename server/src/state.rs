@@ -1,0 +1,129 @@
+//! What every request shares: the prepared scenes, the threads that compute, and whether the service is ready.
+
+use std::io;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use axum::body::Body;
+use axum::http::HeaderMap;
+use nalgebra::{Point3, Vector3};
+use retina_core::needle::shape::RADIUS;
+use retina_core::needle::{Needle, NeedleShape};
+use retina_core::predict::{Control, EffectChoice, Level, Request, Workspace};
+use retina_core::scene::Scene;
+use tokio::sync::Semaphore;
+
+use crate::answer::{answer, predict};
+use crate::body::{self, LARGE_AT_ONCE};
+use crate::config::Config;
+use crate::pool::{Pool, PoolError};
+use crate::problem::{Kind, Problem};
+use crate::scenes::Scenes;
+use crate::stopwatch::Stopwatch;
+use crate::wire::request::SceneChoice;
+use crate::write::Layout;
+
+/// Force of the warm-up on every built-in scene, mN: enough for contact, far from any limit.
+const WARM_UP_FORCE_MN: f64 = 0.1;
+
+/// How long each prediction of the warm-up may take.
+const WARM_UP_LIMIT: Duration = Duration::from_secs(60);
+
+/// Shared by all requests.
+pub type AppState = Arc<App>;
+
+/// The service without its routes.
+pub struct App {
+    scenes: Arc<Scenes>,
+    pool: Pool,
+    large_bodies: Arc<Semaphore>,
+    warm_up: Arc<OnceLock<Result<(), Problem>>>,
+    time_limit: Duration,
+}
+
+impl App {
+    /// Starts the numerical threads and the warm-up on the first of them.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn start(config: &Config) -> io::Result<AppState> {
+        let scenes = Arc::new(Scenes::new(config.scene_cache_bytes()));
+        let warm_up = Arc::new(OnceLock::new());
+        let time_limit = config.time_limit();
+        let first = {
+            let (scenes, outcome) = (Arc::clone(&scenes), Arc::clone(&warm_up));
+            move |workspace: &mut Workspace| {
+                let result = prepare_built_in(&scenes, workspace);
+                if let Err(problem) = &result {
+                    tracing::error!(detail = %problem.detail, "the built-in scenes could not be prepared");
+                }
+                // The first thread alone sets it, once.
+                let _ = outcome.set(result);
+            }
+        };
+        Ok(Arc::new(Self {
+            pool: Pool::start(config.threads(), config.queue.into(), first)?,
+            large_bodies: Arc::new(Semaphore::new(LARGE_AT_ONCE)),
+            scenes,
+            warm_up,
+            time_limit,
+        }))
+    }
+
+    /// Answers the request whose body is on its way.
+    ///
+    /// # Errors
+    /// The problem that the caller is told of.
+    pub async fn answer(&self, headers: &HeaderMap, body: Body) -> Result<Vec<u8>, Problem> {
+        let body = body::json(headers, body, &self.large_bodies).await?;
+        let accepted = Instant::now();
+        let (scenes, limit) = (Arc::clone(&self.scenes), self.time_limit);
+        let job = move |workspace: &mut Workspace, abandoned: &dyn Fn() -> bool| {
+            let mut stopwatch = Stopwatch::start(accepted, limit, abandoned);
+            answer(body.as_ref(), &scenes, workspace, &mut stopwatch)
+        };
+        self.pool.run(job).await.unwrap_or_else(|error| {
+            Err(match error {
+                PoolError::Full => {
+                    Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
+                }
+                PoolError::Panicked => Problem::internal(error),
+            })
+        })
+    }
+
+    /// Whether every built-in scene has answered at the levels that a simulator uses.
+    ///
+    /// # Errors
+    /// [`Kind::NotReady`], or what the warm-up failed with.
+    pub fn ready(&self) -> Result<(), Problem> {
+        match self.warm_up.get() {
+            Some(Ok(())) => Ok(()),
+            Some(Err(problem)) => Err(Problem::new(
+                Kind::NotReady,
+                format!("The built-in scenes could not be prepared: {}", problem.detail),
+            )),
+            None => Err(Problem::new(Kind::NotReady, "The built-in scenes are being prepared.")),
+        }
+    }
+}
+
+/// A light touch on every built-in scene, so that what depends on the scene alone is there before the first request.
+fn prepare_built_in(scenes: &Scenes, workspace: &mut Workspace) -> Result<(), Problem> {
+    let shape = NeedleShape::hemispherical(RADIUS.default);
+    let needle = Needle::pointing(shape, Point3::origin(), &-Vector3::z_axis());
+    for name in Scene::built_in_names() {
+        let scene = scenes.get(Some(&SceneChoice::Name((*name).to_owned())))?;
+        for level in [Level::Linear, Level::Coarse] {
+            let request = Request {
+                needle,
+                control: Control::Force(Vector3::new(0.0, 0.0, -WARM_UP_FORCE_MN)),
+                level,
+                effects: EffectChoice::Auto,
+            };
+            let mut stopwatch = Stopwatch::start(Instant::now(), WARM_UP_LIMIT, &|| false);
+            predict(&scene, &request, workspace, &mut stopwatch, Layout::Compact)?;
+        }
+    }
+    Ok(())
+}

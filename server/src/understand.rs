@@ -1,0 +1,145 @@
+//! From the wire's request to the core's: names looked up, defaults filled in, contradictions refused.
+//!
+//! Contract: what comes out is inside the ranges of the core; what does not get through is a problem that names the field.
+//!
+//! Not here: JSON (`read`), anything that needs the tissue's answer.
+
+mod needle;
+mod scene;
+
+use nalgebra::Vector3;
+use retina_core::effects::EFFECT_NAMES;
+use retina_core::predict::{Control, EffectChoice, Level, Request};
+use retina_core::range::ParameterRange;
+use serde_json::json;
+
+pub use scene::{built_in, chosen, scene};
+
+use crate::problem::{Kind, Problem, from_out_of_range};
+use crate::wire::fixed::Vector;
+use crate::wire::request::{AccuracySpec, ControlName, EffectsSpec, PredictRequest};
+
+/// The scene of a request that names none.
+pub const DEFAULT_SCENE: &str = "macula";
+
+/// The level of a request that names none.
+pub const DEFAULT_LEVEL: Level = Level::Coarse;
+
+/// The gauge of a request that gives neither gauge nor radius.
+pub const DEFAULT_GAUGE: &str = "25G";
+
+/// How long a force may be. Whether the tissue holds it is for the core to say.
+pub const FORCE: ParameterRange = ParameterRange {
+    name: "length of the force",
+    unit: "mN",
+    default: 0.0,
+    min: 0.0,
+    max: 100.0,
+    source: "bound of this program: forces at the retina are below 7.5 mN (surgeons stay unaware of those), and 100 mN is no surgery",
+};
+
+/// How far the length of a quaternion may be from 1; it is then made 1.
+const QUATERNION_TOLERANCE: f64 = 1e-3;
+
+/// The core's request; the scene is looked up apart, see [`crate::scenes`].
+///
+/// # Errors
+/// A problem that names the field.
+pub fn request(request: &PredictRequest) -> Result<Request, Problem> {
+    Ok(Request {
+        needle: needle::needle(&request.needle)?,
+        control: control(request.control, request.force_mn)?,
+        level: level(request.accuracy.as_ref())?,
+        effects: effects(request.effects.as_ref())?,
+    })
+}
+
+fn control(control: ControlName, force_mn: Option<Vector>) -> Result<Control, Problem> {
+    match (control, force_mn) {
+        (ControlName::Force, Some(Vector(force_mn))) => {
+            let force = Vector3::from(force_mn);
+            FORCE.check("force_mn", force.norm()).map_err(|error| {
+                let mut problem = from_out_of_range("force_mn".to_owned(), &error);
+                // The caller wrote a vector, so that is what is shown; its length may not even be finite.
+                problem.errors[0].value = Some(json!(force_mn));
+                problem.errors[0].allowed = format!("length {}", problem.errors[0].allowed);
+                problem
+            })?;
+            Ok(Control::Force(force))
+        }
+        (ControlName::Force, None) => Err(Problem::field(
+            Kind::InvalidRequest,
+            "force_mn",
+            None,
+            "required",
+            "force_mn is missing; without a force, \"control\" must be \"pose\"",
+        )),
+        (ControlName::Pose, None) => Ok(Control::Pose),
+        (ControlName::Pose, Some(Vector(force_mn))) => Err(Problem::field(
+            Kind::InvalidRequest,
+            "force_mn",
+            Some(json!(force_mn)),
+            "left out when \"control\" is \"pose\"",
+            "under pose control the needle stays where it is and the force is the answer, so force_mn must be left out",
+        )),
+    }
+}
+
+fn level(accuracy: Option<&AccuracySpec>) -> Result<Level, Problem> {
+    let Some(accuracy) = accuracy else {
+        return Ok(DEFAULT_LEVEL);
+    };
+    let promises = [("accuracy.max_error_um", &accuracy.max_error_um), ("accuracy.max_time_ms", &accuracy.max_time_ms)];
+    if let Some((field, _)) = promises.into_iter().find(|(_, given)| given.is_some()) {
+        let detail = format!("{field} is not supported by this version: choose a level with accuracy.level");
+        let allowed = "left out; use accuracy.level";
+        return Err(Problem::field(Kind::NotSupported, field, None, allowed, detail));
+    }
+    let Some(name) = &accuracy.level else {
+        return Ok(DEFAULT_LEVEL);
+    };
+    let names: Vec<&str> = Level::ALL.map(Level::name).to_vec();
+    Level::ALL
+        .into_iter()
+        .find(|level| level.name() == name)
+        .ok_or_else(|| unknown_name("accuracy.level", name, &names))
+}
+
+fn effects(effects: Option<&EffectsSpec>) -> Result<EffectChoice, Problem> {
+    let known = |field: &str, name: &String| match EFFECT_NAMES.contains(&name.as_str()) {
+        true => Ok(()),
+        false => Err(unknown_name(field, name, &EFFECT_NAMES)),
+    };
+    match effects {
+        None => Ok(EffectChoice::Auto),
+        Some(EffectsSpec::Word(word)) if word == "auto" => Ok(EffectChoice::Auto),
+        Some(EffectsSpec::Word(word)) if word == "all" => Ok(EffectChoice::All),
+        Some(EffectsSpec::Word(word)) => Err(unknown_name("effects", word, &["auto", "all", "an array of names"])),
+        Some(EffectsSpec::Names(names)) => {
+            for (index, name) in names.iter().enumerate() {
+                known(&format!("effects[{index}]"), name)?;
+            }
+            Ok(EffectChoice::Named(names.clone()))
+        }
+    }
+}
+
+/// The problem of a name that stands for nothing.
+pub(crate) fn unknown_name(field: &str, name: &str, known: &[&str]) -> Problem {
+    let shown: String = name.chars().take(60).collect();
+    let allowed = known.join(", ");
+    let detail = format!("{field}: there is no {shown:?}; known are {allowed}");
+    Problem::field(Kind::UnknownName, field, Some(json!(shown)), allowed, detail)
+}
+
+/// A quaternion x, y, z, w of a length near 1, made exactly that long.
+fn rotation(field: &str, xyzw: [f64; 4]) -> Result<nalgebra::UnitQuaternion<f64>, Problem> {
+    let quaternion = nalgebra::Quaternion::from(xyzw);
+    let norm = quaternion.norm();
+    if (norm - 1.0).abs() <= QUATERNION_TOLERANCE {
+        return Ok(nalgebra::UnitQuaternion::new_normalize(quaternion));
+    }
+    let detail = format!("{field} has the length {norm}, which is not that of a rotation");
+    let allowed = format!("four numbers of length 1 within {QUATERNION_TOLERANCE}");
+    Err(Problem::field(Kind::OutOfRange, field, Some(json!(xyzw)), allowed, detail))
+}

@@ -1,0 +1,102 @@
+//! The needle of a request.
+
+use nalgebra::{Point3, Unit, Vector3};
+use retina_core::needle::shape::{BEVEL_ANGLE, EDGE_FRACTION_OF_RADIUS};
+use retina_core::needle::{Gauge, Needle, NeedleShape, Tip};
+use serde_json::json;
+
+use super::{DEFAULT_GAUGE, rotation, unknown_name};
+use crate::problem::{Kind, Problem, from_out_of_range};
+use crate::wire::fixed::Vector;
+use crate::wire::request::{BevelledTip, FlatTip, NeedleSpec, TipName, TipShape, TipSpec};
+
+/// A direction must be at least this long; shorter ones are rounding.
+const SHORTEST_DIRECTION: f64 = 1e-9;
+
+/// The needle, inside the core's ranges.
+pub(super) fn needle(spec: &NeedleSpec) -> Result<Needle, Problem> {
+    let radius_mm = radius_mm(spec)?;
+    let shape = NeedleShape { radius_mm, tip: tip(spec.tip.as_ref(), radius_mm)? };
+    let tip_mm = Point3::from(spec.tip_mm.0);
+    let needle = match (&spec.orientation_xyzw, &spec.direction) {
+        (Some(_), Some(_)) => return Err(both("needle.direction", "needle.orientation_xyzw")),
+        (Some(xyzw), None) => Needle { shape, tip_mm, orientation: rotation("needle.orientation_xyzw", xyzw.0)? },
+        (None, Some(direction)) => Needle::pointing(shape, tip_mm, &unit(direction)?),
+        (None, None) => Needle::pointing(shape, tip_mm, &-Vector3::z_axis()),
+    };
+    needle.validate().map_err(|error| from_out_of_range(tip_field(&error.field, &shape), &error))?;
+    Ok(needle)
+}
+
+fn radius_mm(spec: &NeedleSpec) -> Result<f64, Problem> {
+    let name = match (&spec.gauge, spec.radius_mm) {
+        (Some(_), Some(_)) => return Err(both("needle.radius_mm", "needle.gauge")),
+        (None, Some(radius_mm)) => return Ok(radius_mm),
+        (Some(name), None) => name,
+        (None, None) => DEFAULT_GAUGE,
+    };
+    Gauge::from_name(name)
+        .map(|gauge| gauge.radius_mm())
+        .map_err(|unknown| unknown_name("needle.gauge", name, &unknown.allowed))
+}
+
+/// Scaled before it is squared, so that neither 1e-9 nor 1e300 is lost.
+fn unit(direction: &Vector) -> Result<Unit<Vector3<f64>>, Problem> {
+    let vector = Vector3::from(direction.0);
+    let largest = vector.amax();
+    if largest > 0.0 {
+        let scaled = vector / largest;
+        if scaled.norm() * largest >= SHORTEST_DIRECTION {
+            return Ok(Unit::new_normalize(scaled));
+        }
+    }
+    Err(Problem::field(
+        Kind::OutOfRange,
+        "needle.direction",
+        Some(json!(direction.0)),
+        format!("a vector of length {SHORTEST_DIRECTION:e} or more"),
+        "needle.direction is too short to point anywhere",
+    ))
+}
+
+fn tip(spec: Option<&TipSpec>, radius_mm: f64) -> Result<Tip, Problem> {
+    let edge = |given: Option<f64>| given.unwrap_or(EDGE_FRACTION_OF_RADIUS * radius_mm);
+    let flat = |spec: &FlatTip| Tip::Flat { edge_radius_mm: edge(spec.edge_radius_mm) };
+    let bevelled = |spec: &BevelledTip| Tip::Bevelled {
+        angle_deg: spec.angle_deg.unwrap_or(BEVEL_ANGLE.default),
+        edge_radius_mm: edge(spec.edge_radius_mm),
+    };
+    match spec {
+        None | Some(TipSpec::Name(TipName::Hemispherical)) => Ok(Tip::Hemispherical),
+        Some(TipSpec::Name(TipName::Flat)) => Ok(flat(&FlatTip { edge_radius_mm: None })),
+        Some(TipSpec::Name(TipName::Bevelled)) => Ok(bevelled(&BevelledTip { angle_deg: None, edge_radius_mm: None })),
+        Some(TipSpec::Shape(TipShape { flat: Some(spec), bevelled: None })) => Ok(flat(spec)),
+        Some(TipSpec::Shape(TipShape { flat: None, bevelled: Some(spec) })) => Ok(bevelled(spec)),
+        Some(TipSpec::Shape(_)) => Err(Problem::field(
+            Kind::InvalidRequest,
+            "needle.tip",
+            None,
+            "exactly one of flat, bevelled",
+            "needle.tip must have exactly one of the fields flat and bevelled",
+        )),
+    }
+}
+
+/// The core calls both tips `tip`; on the wire each has a name.
+fn tip_field(field: &str, shape: &NeedleShape) -> String {
+    match (field.strip_prefix("needle.tip."), shape.tip) {
+        (Some(number), Tip::Flat { .. }) => format!("needle.tip.flat.{number}"),
+        (Some(number), Tip::Bevelled { .. }) => format!("needle.tip.bevelled.{number}"),
+        _ => field.to_owned(),
+    }
+}
+
+fn both(field: &str, other: &str) -> Problem {
+    Problem::field(
+        Kind::InvalidRequest,
+        field,
+        None,
+        format!("left out when {other} is given"),
+        format!("{field} and {other} exclude each other"),
+    )
+}

@@ -1,0 +1,20 @@
+//! Every message that crosses the wire, and nothing else.
+//!
+//! Contract: field names carry their units; unknown fields, lists in place of objects and arrays of the wrong length are errors;
+//! a field that is `null` counts as left out. The schemas of `/openapi.json` are generated from these types.
+//!
+//! Not here: what the numbers mean to the physics (`understand`), how errors are worded (`read`, `problem`).
+
+pub mod catalog;
+mod either;
+pub mod fixed;
+pub mod object;
+pub mod request;
+pub mod response;
+pub mod scene;
+
+pub use catalog::{GaugeList, LevelList, Readiness, SceneList};
+pub use fixed::{Quaternion, Triangle, Vector};
+pub use request::PredictRequest;
+pub use response::PredictResponse;
+pub use scene::SceneSpec;

@@ -1,0 +1,228 @@
+//! The answer of `POST /v1/predict`, written straight from the core's prediction without a copy.
+
+use std::time::Duration;
+
+use nalgebra::{Point3, Vector3};
+use retina_core::predict::{ContactState, EffectReport, Prediction, SolverReport};
+use serde::ser::{SerializeMap, SerializeSeq};
+use serde::{Serialize, Serializer};
+use utoipa::ToSchema;
+
+use super::fixed::{Triangle, Vector};
+
+/// What the surface looks like now, where the needle is and what the answer cost.
+#[derive(Serialize, ToSchema)]
+pub struct PredictResponse<'a> {
+    /// The deformed surface.
+    pub surface: SurfaceAnswer<'a>,
+    /// The needle at equilibrium.
+    pub needle: NeedleAnswer,
+    /// The contact at equilibrium.
+    pub contact: ContactAnswer,
+    /// How accurate the answer is.
+    pub accuracy: AccuracyAnswer,
+    /// Every effect, simulated or not, and why.
+    pub effects: Vec<EffectAnswer<'a>>,
+    /// What the solution cost, in units that do not depend on the machine.
+    pub solver: SolverAnswer,
+    /// What the answer cost on this machine.
+    pub time_us: TimeAnswer<'a>,
+    /// What the caller should know besides.
+    pub warnings: &'a [String],
+}
+
+/// The deformed surface, scene frame. A grid patch has 64 vertices row by row (x fastest) and 98 triangles.
+#[derive(Serialize, ToSchema)]
+pub struct SurfaceAnswer<'a> {
+    /// Deformed nodes, mm.
+    #[serde(serialize_with = "points")]
+    #[schema(value_type = Vec<Vector>)]
+    pub vertices_mm: &'a [Point3<f64>],
+    /// Unit normals of the deformed surface at the nodes, out of the tissue.
+    #[serde(serialize_with = "vectors")]
+    #[schema(value_type = Vec<Vector>)]
+    pub normals: &'a [Vector3<f64>],
+    /// Triangles between nodes, counter-clockwise seen from the vitreous.
+    #[schema(value_type = Vec<Triangle>)]
+    pub triangles: &'a [[usize; 3]],
+    /// Length of each node's displacement, µm.
+    #[schema(value_type = Vec<f64>)]
+    pub displacement_um: &'a [f64],
+    /// For a patch cut from a mesh: the mesh's index of each node.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<Vec<usize>>)]
+    pub source_indices: Option<&'a [usize]>,
+}
+
+/// The needle at equilibrium.
+#[derive(Serialize, ToSchema)]
+pub struct NeedleAnswer {
+    /// Foremost point, scene frame, mm.
+    pub tip_mm: Vector,
+    /// Advance along the force from where the needle was given, mm; zero under pose control.
+    pub travel_mm: f64,
+    /// Force of the tissue on the needle, scene frame, mN.
+    pub reaction_mn: Vector,
+}
+
+/// The contact at equilibrium.
+#[derive(Serialize, ToSchema)]
+pub struct ContactAnswer {
+    /// Whether needle and retina touch.
+    pub state: ContactWord,
+    /// Contact area, measured on the surface at rest, mm².
+    pub area_mm2: f64,
+    /// Largest principal stretch minus one, in magnitude, anywhere in the tissue.
+    pub max_strain: f64,
+    /// Largest contact pressure, kPa.
+    pub max_pressure_kpa: f64,
+    /// Deepest penetration of the needle that the contact law left, µm.
+    pub max_penetration_um: f64,
+}
+
+/// Whether needle and retina touch.
+#[derive(Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactWord {
+    /// They do not.
+    Clear,
+    /// They do.
+    Touching,
+}
+
+/// How accurate the answer is.
+#[derive(Serialize, ToSchema)]
+pub struct AccuracyAnswer {
+    /// The level that answered.
+    pub level: &'static str,
+}
+
+/// One effect: simulated or not, and why.
+#[derive(Serialize, ToSchema)]
+pub struct EffectAnswer<'a> {
+    /// Name of the effect.
+    pub name: &'static str,
+    /// Whether it was simulated.
+    pub simulated: bool,
+    /// Why, in words.
+    pub reason: &'a str,
+    /// The number decided on, if there was one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// What it was compared with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threshold: Option<f64>,
+}
+
+/// What the solution cost, in units that do not depend on the machine.
+#[derive(Serialize, ToSchema)]
+pub struct SolverAnswer {
+    /// Newton iterations over all meshes and load steps.
+    pub iterations: usize,
+    /// Load steps.
+    pub load_steps: usize,
+    /// Unknowns of the last mesh.
+    pub unknowns: usize,
+    /// Residual force at the end, mN.
+    pub residual_mn: f64,
+}
+
+/// What the answer cost on this machine, from the arrival of the body to the start of the answer's text.
+#[derive(Serialize, ToSchema)]
+pub struct TimeAnswer<'a> {
+    /// All stages together, µs.
+    pub total: f64,
+    /// By stage, µs: `queue` (the wait for a thread), `read` (the body), `prepare` (finding the scene, or making it) and then those of the
+    /// level.
+    #[serde(serialize_with = "stages")]
+    #[schema(value_type = std::collections::BTreeMap<String, f64>)]
+    pub stages: &'a [(&'static str, Duration)],
+}
+
+impl<'a> PredictResponse<'a> {
+    /// The answer that tells of `prediction`, which took the stages that are given.
+    pub fn new(prediction: &'a Prediction, stages: &'a [(&'static str, Duration)]) -> Self {
+        let Prediction { needle, contact, .. } = prediction;
+        Self {
+            surface: SurfaceAnswer {
+                vertices_mm: &prediction.vertices,
+                normals: &prediction.normals,
+                triangles: &prediction.triangles,
+                displacement_um: &prediction.displacement_um,
+                source_indices: prediction.source_indices.as_deref(),
+            },
+            needle: NeedleAnswer {
+                tip_mm: Vector(needle.tip_mm.coords.into()),
+                travel_mm: needle.travel_mm,
+                reaction_mn: Vector(needle.reaction_mn.into()),
+            },
+            contact: ContactAnswer {
+                state: match contact.state {
+                    ContactState::Clear => ContactWord::Clear,
+                    ContactState::Touching => ContactWord::Touching,
+                },
+                area_mm2: contact.area_mm2,
+                max_strain: contact.max_strain,
+                max_pressure_kpa: contact.max_pressure_kpa,
+                max_penetration_um: contact.max_penetration_mm * 1e3,
+            },
+            accuracy: AccuracyAnswer { level: prediction.level.name() },
+            effects: prediction.effects.iter().map(EffectAnswer::from).collect(),
+            solver: SolverAnswer::from(&prediction.solver),
+            time_us: TimeAnswer { total: micros(stages.iter().map(|(_, time)| *time).sum()), stages },
+            warnings: &prediction.warnings,
+        }
+    }
+}
+
+impl<'a> From<&'a EffectReport> for EffectAnswer<'a> {
+    fn from(report: &'a EffectReport) -> Self {
+        Self {
+            name: report.name,
+            simulated: report.simulated,
+            reason: &report.reason,
+            value: report.value,
+            threshold: report.threshold,
+        }
+    }
+}
+
+impl From<&SolverReport> for SolverAnswer {
+    fn from(report: &SolverReport) -> Self {
+        Self {
+            iterations: report.iterations,
+            load_steps: report.load_steps,
+            unknowns: report.unknowns,
+            residual_mn: report.residual_mn,
+        }
+    }
+}
+
+fn points<S: Serializer>(points: &&[Point3<f64>], serializer: S) -> Result<S::Ok, S::Error> {
+    let mut list = serializer.serialize_seq(Some(points.len()))?;
+    for point in *points {
+        list.serialize_element(&[point.x, point.y, point.z])?;
+    }
+    list.end()
+}
+
+fn vectors<S: Serializer>(vectors: &&[Vector3<f64>], serializer: S) -> Result<S::Ok, S::Error> {
+    let mut list = serializer.serialize_seq(Some(vectors.len()))?;
+    for vector in *vectors {
+        list.serialize_element(&[vector.x, vector.y, vector.z])?;
+    }
+    list.end()
+}
+
+fn stages<S: Serializer>(stages: &&[(&'static str, Duration)], serializer: S) -> Result<S::Ok, S::Error> {
+    let mut map = serializer.serialize_map(Some(stages.len()))?;
+    for (name, time) in *stages {
+        map.serialize_entry(name, &micros(*time))?;
+    }
+    map.end()
+}
+
+/// Whole nanoseconds over a thousand, so that the text has three digits after the point at most.
+fn micros(time: Duration) -> f64 {
+    time.as_nanos() as f64 / 1e3
+}

@@ -1,0 +1,124 @@
+//! A scene written out: surface, tissue and placement.
+//!
+//! Contract: every part and every number may be left out; what then holds is said field by field and listed with ranges and sources
+//! by `GET /v1/scenes`. Written and read by the same types, so a scene of that list can be sent back as it stands.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::fixed::{Quaternion, Triangle, Vector};
+use super::object;
+
+/// A scene written out.
+#[derive(Clone, Debug, Default, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSpec {
+    /// The inner surface of the retina at rest; a sphere of 12 mm radius when left out.
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
+    pub surface: Option<SurfaceSpec>,
+    /// The layers under it; retina on choroid on sclera with their defaults when left out.
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
+    pub tissue: Option<TissueSpec>,
+    /// Where the patch stands in the scene frame; the identity when left out. Refused for a mesh, which places its own patch.
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
+    pub pose: Option<PoseSpec>,
+}
+
+/// What a surface is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SurfaceKind {
+    /// A plane.
+    Flat,
+    /// A ball seen from inside.
+    Sphere,
+    /// A ball seen from inside with a foveal pit.
+    FovealPit,
+    /// Triangles in the scene frame; the 64 vertices nearest to the contact are the nodes.
+    Mesh,
+}
+
+/// The inner surface of the retina at rest. A field that does not belong to the kind is refused.
+#[derive(Clone, Debug, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(example = json!({"kind": "foveal_pit", "radius_mm": 12.0, "depth_mm": 0.1, "sigma_mm": 0.25}))]
+pub struct SurfaceSpec {
+    /// What it is.
+    pub kind: SurfaceKind,
+    /// `sphere`, `foveal_pit`: radius of the eye at the inner surface, mm; 12 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_mm: Option<f64>,
+    /// `foveal_pit`: how much thinner the retina is at the floor of the pit, mm; 0.13 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth_mm: Option<f64>,
+    /// `foveal_pit`: standard deviation of the pit's bell, mm; 0.25 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma_mm: Option<f64>,
+    /// `mesh`: vertices, scene frame, mm; together with `triangles`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vertices_mm: Option<Vec<Vector>>,
+    /// `mesh`: triangles, counter-clockwise seen from the vitreous.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub triangles: Option<Vec<Triangle>>,
+    /// `mesh`: the text of an OBJ file in mm, in place of `vertices_mm` and `triangles`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub obj: Option<String>,
+    /// `mesh`: the text of an ASCII PLY file in mm, in place of `vertices_mm` and `triangles`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ply: Option<String>,
+}
+
+/// The layers of the eye wall, from the vitreous outwards.
+#[derive(Clone, Debug, Default, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TissueSpec {
+    /// The membrane between vitreous and retina; none when left out, the default one for `{}`.
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
+    pub inner_limiting_membrane: Option<LayerSpec>,
+    /// The retina as one layer, or its sublayers from the vitreous outwards.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub retina: Option<RetinaSpec>,
+    /// Choroid with Bruch's membrane and the pigment epithelium.
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
+    pub choroid: Option<LayerSpec>,
+    /// Sclera.
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
+    pub sclera: Option<LayerSpec>,
+}
+
+/// The retina as one layer or as several.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum RetinaSpec {
+    /// One layer.
+    Whole(LayerSpec),
+    /// Sublayers from the vitreous outwards.
+    Sublayers(Vec<LayerSpec>),
+}
+
+/// One homogeneous, isotropic elastic layer; a number left out is that of the layer's default.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LayerSpec {
+    /// Thickness along the inward normal, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thickness_mm: Option<f64>,
+    /// Young's modulus at small strain, kPa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub youngs_modulus_kpa: Option<f64>,
+    /// Poisson's ratio, 0 to 0.4999.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub poisson_ratio: Option<f64>,
+}
+
+/// Where the patch of an analytic surface stands in the scene.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PoseSpec {
+    /// Origin of the patch frame, scene frame, mm; the scene's origin when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_mm: Option<Vector>,
+    /// Rotation from the patch's frame to the scene's, as x, y, z, w; none when left out. Its length may differ from 1 by 0.001.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub orientation_xyzw: Option<Quaternion>,
+}

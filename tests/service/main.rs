@@ -1,0 +1,15 @@
+//! The service as its callers see it: in process, over real sockets and on the command line.
+//!
+//! Contract: every test can fail, and asserts what a caller relies on: status, media type, the field that a problem names.
+//!
+//! Not here: whether the physics is right, which the other tiers say.
+
+mod answers;
+mod catalog;
+mod harness;
+mod load;
+mod program;
+mod properties;
+mod refusals;
+mod schema;
+mod sockets;
