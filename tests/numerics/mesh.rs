@@ -87,7 +87,11 @@ fn disc_geometry(rings: usize, center: [f64; 2]) -> DiscGeometry {
 }
 
 fn wall(topology: &WallTopology, center: [f64; 2]) -> WallGeometry {
-    let layers = [(0.25, true), (0.2, false)].map(|(thickness_mm, thins)| LayerThickness { thickness_mm, thins });
+    let layers = [(0.25, true), (0.2, false)].map(|(thickness_mm, thins)| LayerThickness {
+        thickness_mm,
+        thins,
+        first_element_mm: f64::INFINITY,
+    });
     let surface = Surface::FovealPit { radius_mm: 12.0, depth_mm: 0.1, sigma_mm: 0.25 };
     WallGeometry::new(topology, &disc_geometry(3, center), &layers, |x, y| surface.column(x, y)).unwrap()
 }

@@ -1,6 +1,6 @@
-//! Makes `tests/data/held_out.json` anew: 8 requests per built-in scene from fixed seeds, answered by level `reference`.
+//! Makes `tests/data/held_out.json` anew: requests on every built-in scene from fixed seeds, answered by level `reference`.
 //!
-//! `cargo run --release -p retina-tests --bin held_out` takes two to three minutes. Its output moves only with a change of the physics
+//! `cargo run --release -p retina-tests --bin held_out [-- REQUESTS_PER_SCENE]` takes some seconds a request. Its output moves only with a change of the physics
 //! or of the reference's mesh, in a commit that says why. Limits of the cheaper levels are their errors now with [`MARGIN`].
 
 use std::error::Error;
@@ -11,7 +11,7 @@ use retina_core::scene::Scene;
 use retina_tests::held_out::{HeldOut, Limit, PATH, ROUNDING_UM, Sample, displacements_um, prepare};
 use retina_tests::working_range::WorkingRange;
 
-/// Requests per scene.
+/// Requests per scene unless told.
 const PER_SCENE: usize = 8;
 /// Seed of the first scene; the others follow. Unlike those of the measuring programs' defaults: held out.
 const SEED: u64 = 9001;
@@ -19,6 +19,7 @@ const SEED: u64 = 9001;
 const MARGIN: f64 = 1.02;
 
 fn main() -> Result<(), Box<dyn Error>> {
+    let per_scene = std::env::args().nth(1).map_or(Ok(PER_SCENE), |count| count.parse())?;
     let levels = [Level::Linear, Level::Coarse];
     let mut errors: [Vec<f64>; 2] = Default::default();
     let mut samples = Vec::new();
@@ -27,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let (scene, rest) = prepare(name)?;
         let mut range = WorkingRange::new(&scene.scene().tissue, seed);
         let mut found = 0;
-        while found < PER_SCENE {
+        while found < per_scene {
             let mut request = range.request(Level::Linear);
             if let Err(refusal) = scene.predict(&request, &mut workspace, &mut Silent) {
                 eprintln!("{name}: skipped, {refusal}");
