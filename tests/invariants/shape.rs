@@ -34,7 +34,11 @@ fn surfaces_stay_surfaces_and_out_of_the_needle() {
                 for vertex in &answer.vertices {
                     let distance = body.distance(&pose.inverse_transform_point(vertex));
                     near += usize::from(distance < 0.02);
-                    *deepest = deepest.max(-distance - answer.contact.max_penetration_mm);
+                    let beyond = -distance - answer.contact.max_penetration_mm;
+                    if beyond > BETWEEN_POINTS_MM {
+                        println!("{name} {level:?}: {beyond:e} mm inside at {vertex}, {request:?}");
+                    }
+                    *deepest = deepest.max(beyond);
                 }
             }
         }
