@@ -81,8 +81,9 @@ fn pose_control_gives_back_the_force_that_led_there() {
                 compared += 1;
                 let reaction = -back.needle.reaction_mn.dot(&along);
                 let error = (reaction / magnitude - 1.0).abs();
+                // On the pit `linear` interpolates between beds, by force or by depth: 6e-4 apart, elsewhere less.
                 // `linear` is one formula read both ways; the mesh of `coarse` is made for the linear answer, which differs.
-                let allowed = if level == Level::Linear { 1e-4 } else { DISCRETISATION };
+                let allowed = if level == Level::Linear { 1e-3 } else { DISCRETISATION };
                 assert!(error < allowed, "{name} {level:?}: {reaction} for {magnitude} mN ({error:e}), {held:?}");
                 assert_eq!(back.needle.travel_mm, 0.0);
                 assert_eq!(back.needle.tip_mm, held.needle.tip_mm);
