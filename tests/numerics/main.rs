@@ -4,6 +4,8 @@
 //!
 //! Not here: laws of whole answers and closed forms of mechanics, which have tiers of their own.
 
+mod effects;
+mod mesh;
 mod mesh_file;
 mod meshes;
 mod needle;

@@ -1,5 +1,7 @@
 //! What the test tiers and the measuring programs share. Sees every package, is seen by none.
 
+pub mod held_out;
+pub mod stated_errors;
 pub mod statistics;
 pub mod tolerance;
 pub mod working_range;

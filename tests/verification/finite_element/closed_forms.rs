@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_4;
 
 use nalgebra::Vector3;
-use retina_tests::tolerance::MODEST_MESH;
+use retina_tests::stated_errors::MODEST_MESH;
 
 use super::block::{Body, Law, Mesh, block, lame};
 

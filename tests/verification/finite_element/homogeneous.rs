@@ -3,7 +3,7 @@
 use fastrand::Rng;
 use nalgebra::{Matrix3, Vector3};
 use retina_core::effects::finite_strain::{Lame, NeoHookean};
-use retina_tests::tolerance::IN_THE_SPACE;
+use retina_tests::stated_errors::IN_THE_SPACE;
 
 use super::block::{Body, Law, Mesh, block, lame};
 

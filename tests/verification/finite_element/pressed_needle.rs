@@ -10,7 +10,7 @@ use retina_core::progress::Silent;
 use retina_core::solve::newton::Workspace;
 use retina_core::surface::Surface;
 use retina_core::tissue::{Layer, Tissue};
-use retina_tests::tolerance::{MODEST_MESH, PENALTY};
+use retina_tests::stated_errors::{MODEST_MESH, PENALTY};
 
 /// One bonded layer in sheets of these thicknesses, one element each, inner sheet first. The rigid base is what choroid and sclera without
 /// elements are.

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 use retina_core::effects::finite_strain::NeoHookean;
-use retina_tests::tolerance::{LINEAR_TABLE, LINEAR_TABLE_EDGE, NEO_HOOKEAN_TABLE};
+use retina_tests::stated_errors::{LINEAR_TABLE, LINEAR_TABLE_EDGE, NEO_HOOKEAN_TABLE};
 
 use super::block::{Body, Law, Mesh, lame, slab};
 

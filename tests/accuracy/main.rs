@@ -1,0 +1,74 @@
+//! Micrometre regressions: cheap levels against the stored answers of level `reference` on held-out requests.
+//!
+//! Contract: `tests/data/held_out.json` holds the answers and the limits; `cargo run --release -p retina-tests --bin held_out` makes it
+//! anew. Not here: laws (`invariants`), truth about the reference itself (`verification`).
+
+use std::collections::HashMap;
+
+use nalgebra::Point3;
+use retina_core::predict::{Level, PreparedScene, Workspace};
+use retina_core::progress::Silent;
+use retina_core::scene::Scene;
+use retina_tests::held_out::{HeldOut, PATH, prepare};
+
+/// Largest node difference of a recomputed reference [µm]: the solver's tolerance and another machine's rounding, a tenth of the
+/// reference's own error.
+const RECOMPUTED_UM: f64 = 0.05;
+
+fn held_out() -> HeldOut {
+    serde_json::from_str(&std::fs::read_to_string(PATH).unwrap()).unwrap()
+}
+
+fn scenes() -> HashMap<String, (PreparedScene, Vec<Point3<f64>>)> {
+    Scene::built_in_names().iter().map(|&name| (name.to_owned(), prepare(name).unwrap())).collect()
+}
+
+#[test]
+fn levels_stay_within_their_stored_errors() {
+    let (sample, scenes, mut workspace) = (held_out(), scenes(), Workspace::default());
+    assert!(sample.samples.len() >= 9, "{}", sample.samples.len());
+    for level in [Level::Linear, Level::Coarse] {
+        let mut errors = Vec::new();
+        for stored in &sample.samples {
+            let (scene, rest) = &scenes[&stored.scene];
+            let answer = scene.predict(&stored.request(level), &mut workspace, &mut Silent).unwrap();
+            errors.extend(stored.errors_um(rest, &answer));
+        }
+        let mean_um = errors.iter().sum::<f64>() / errors.len() as f64;
+        let worst_um = errors.iter().copied().fold(0.0, f64::max);
+        let limit = sample.limits.iter().find(|limit| limit.level == level.name()).unwrap();
+        assert!(mean_um <= limit.mean_limit_um, "{}: mean {mean_um} µm, limit {}", level.name(), limit.mean_limit_um);
+        assert!(
+            worst_um <= limit.worst_limit_um,
+            "{}: worst {worst_um} µm, limit {}",
+            level.name(),
+            limit.worst_limit_um
+        );
+        // A level that got much better deserves new limits.
+        assert!(mean_um >= 0.5 * limit.mean_um, "{}: mean {mean_um} µm, stored {}", level.name(), limit.mean_um);
+    }
+}
+
+#[test]
+fn each_level_is_better_than_the_one_before() {
+    let sample = held_out();
+    let mean = |name: &str| sample.limits.iter().find(|limit| limit.level == name).unwrap().mean_um;
+    let lengths = sample.samples.iter().flat_map(|s| s.reference_um.iter().map(|u| Point3::from(*u).coords.norm()));
+    let nothing_moves = lengths.clone().sum::<f64>() / lengths.count() as f64;
+    assert!(mean("coarse") < mean("linear"), "{} {}", mean("coarse"), mean("linear"));
+    assert!(mean("linear") < nothing_moves, "{} {nothing_moves}", mean("linear"));
+}
+
+#[test]
+fn the_reference_is_still_the_stored_one() {
+    let (sample, scenes, mut workspace) = (held_out(), scenes(), Workspace::default());
+    // One of a plane and one of the pit: mesh, surface and thinning all enter.
+    for stored in [&sample.samples[0], &sample.samples[sample.samples.len() - 1]] {
+        let (scene, rest) = &scenes[&stored.scene];
+        let answer = scene.predict(&stored.request(Level::Reference), &mut workspace, &mut Silent).unwrap();
+        let worst_um = stored.errors_um(rest, &answer).into_iter().fold(0.0, f64::max);
+        assert!(worst_um <= RECOMPUTED_UM, "{} {}: {worst_um} µm", stored.scene, stored.tip);
+        let largest_um = answer.displacement_um.iter().copied().fold(0.0, f64::max);
+        assert!(largest_um > 20.0 * RECOMPUTED_UM, "a node that does not move proves nothing: {largest_um} µm");
+    }
+}
