@@ -124,9 +124,10 @@ const POSE_FORCE_SCALE_MN: f64 = 0.01;
 /// Smallest force scale [mN]: below it rounding of the tissue's stresses decides.
 const SMALLEST_FORCE_MN: f64 = 1e-7;
 /// What is tried, in this order: directly from the given start, then from first touch in load steps.
-const ATTEMPTS: [Attempt; 3] = [
+const ATTEMPTS: [Attempt; 4] = [
     Attempt { load_steps: 1, globalization: Globalization::PredictedStress, max_iterations: 25 },
-    Attempt { load_steps: 6, globalization: Globalization::PredictedStress, max_iterations: 20 },
+    Attempt { load_steps: 4, globalization: Globalization::PredictedStress, max_iterations: 18 },
+    Attempt { load_steps: 8, globalization: Globalization::PredictedStress, max_iterations: 20 },
     Attempt { load_steps: 12, globalization: Globalization::LineSearch, max_iterations: 100 },
 ];
 /// Iterations in which the needle waits for the tissue.

@@ -33,10 +33,13 @@ use topologies::shared_topology;
 /// Force over the needle's cross-section, in Young's moduli of the innermost retina, beyond which tissue models of this kind do not
 /// hold: the needle punctures. Chosen where the finite-element levels still converge throughout; no puncture force of the retina is
 /// published.
-pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = 1.5;
+pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = 0.75;
 
 /// Depth beyond which no answer is given, as a share of retina and choroid under the contact.
 pub const MAX_DEPTH_SHARE: f64 = 0.7;
+
+/// Penetration of the needle into the predicted surface from which on an answer warns of it [mm].
+pub const PENETRATION_WARNING_MM: f64 = 5e-3;
 
 /// A scene with everything that depends on it alone. Shared between threads.
 pub struct PreparedScene {
@@ -215,7 +218,19 @@ impl Question<'_> {
             Level::Coarse => self.coarse(&linear, &decision, workspace, progress)?,
             Level::Reference => self.fine(resolution, &linear, &decision, workspace, progress)?,
         };
-        Ok(self.prediction(answer, decision))
+        Ok(self.prediction(self.with_node_penetration(answer), decision))
+    }
+
+    /// Adds to the reported penetration that of the patch's own nodes: a coarse face may cut a sharp edge between its quadrature points.
+    fn with_node_penetration(&self, mut answer: FiniteElementAnswer) -> FiniteElementAnswer {
+        let mut pose = self.tool.patch_from_needle;
+        pose.translation.vector += self.motion.direction.into_inner() * answer.travel_mm;
+        let penetration = |(vertex, moved): (&Point3<f64>, &Vector3<f64>)| {
+            -self.tool.body.distance(&pose.inverse_transform_point(&(vertex + moved)))
+        };
+        let nodes = self.patch().vertices.iter().zip(&answer.displacements).map(penetration);
+        answer.contact.max_penetration_mm = nodes.fold(answer.contact.max_penetration_mm, f64::max);
+        answer
     }
 
     /// Thickness of retina and choroid [mm].
@@ -251,12 +266,6 @@ impl Question<'_> {
         let travel_mm = if self.motion.force_mn.is_some() { linear.travel_mm() } else { 0.0 };
         let displacements: Vec<Vector3<f64>> =
             self.patch().parameters.iter().map(|&parameter| linear.displacement(parameter)).collect();
-        let mut pose = self.tool.patch_from_needle;
-        pose.translation.vector += self.motion.direction.into_inner() * travel_mm;
-        let penetration = |(vertex, moved): (&Point3<f64>, &Vector3<f64>)| {
-            -self.tool.body.distance(&pose.inverse_transform_point(&(vertex + moved)))
-        };
-        let max_penetration_mm = self.patch().vertices.iter().zip(&displacements).map(penetration).fold(0.0, f64::max);
         FiniteElementAnswer {
             displacements,
             travel_mm,
@@ -265,7 +274,7 @@ impl Question<'_> {
                 state: ContactState::Touching,
                 area_mm2: std::f64::consts::PI * radius_mm * radius_mm,
                 max_pressure_kpa: linear.max_pressure_kpa,
-                max_penetration_mm,
+                max_penetration_mm: 0.0,
                 max_strain: strain,
             },
             solver: SolverReport::default(),
@@ -389,6 +398,13 @@ impl Question<'_> {
         let unused = decision.reports.iter().find(|r| !r.simulated && r.value > r.threshold && r.value.is_some());
         if let Some(effect) = unused {
             warnings.push(format!("`{}` is not simulated though the scene calls for it", effect.name));
+        }
+        let penetration_mm = answer.contact.max_penetration_mm;
+        if penetration_mm > PENETRATION_WARNING_MM {
+            warnings.push(format!(
+                "the needle stands {:.1} µm inside the predicted surface: its edge is sharper than this level resolves",
+                penetration_mm * 1e3
+            ));
         }
         Prediction {
             vertices: deformed.iter().map(|vertex| frame * vertex).collect(),

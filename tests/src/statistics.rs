@@ -12,11 +12,6 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
     sorted[low] + (at - low as f64) * (sorted[high] - sorted[low])
 }
 
-/// Root mean square; NaN for none.
-pub fn root_mean_square(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
-}
-
 /// Distances between corresponding nodes [µm].
 pub fn node_errors_um(a: &[Point3<f64>], b: &[Point3<f64>]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| (a - b).norm() * 1e3).collect()

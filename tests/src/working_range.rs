@@ -40,10 +40,15 @@ impl WorkingRange {
         low + (high - low) * self.random.f64()
     }
 
+    /// The radius of a gauge drawn at random [mm].
+    pub fn radius_mm(&mut self) -> f64 {
+        let gauge = self.random.choice(GAUGES).unwrap_or(GAUGES[0]);
+        Gauge::from_name(gauge).map_or(0.25, |g| g.radius_mm())
+    }
+
     /// The next request at `level`, force control, effects chosen by `auto`.
     pub fn request(&mut self, level: Level) -> Request {
-        let gauge = self.random.choice(GAUGES).unwrap_or(GAUGES[0]);
-        let radius_mm = Gauge::from_name(gauge).map_or(0.25, |g| g.radius_mm());
+        let radius_mm = self.radius_mm();
         let shape = match self.random.u8(0..4) {
             0 => NeedleShape::flat(radius_mm),
             1 => NeedleShape::bevelled(radius_mm),

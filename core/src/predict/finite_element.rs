@@ -182,7 +182,7 @@ impl Problem<'_> {
         progress.stage("equilibrium");
         let equilibrium = wall
             .solve(&motion, touch_mm, positions, workspace, progress)
-            .map_err(|cause| PredictError::Solver { level: *level, cause })?;
+            .map_err(|cause| PredictError::Solver { level, cause })?;
         progress.stage("surface");
         Ok(self.answer(&wall, &equilibrium, touch_mm))
     }

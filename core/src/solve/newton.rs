@@ -188,8 +188,9 @@ const STRESS_STIFFNESS_BELOW: f64 = 0.1;
 const MAX_HALVINGS: usize = 30;
 /// Share of the predicted decrease that a step must achieve (Armijo).
 const SUFFICIENT_DECREASE: f64 = 1e-4;
-/// Relative rounding error of the total energy, below which a decrease cannot be seen.
-const ENERGY_ROUNDOFF: f64 = 1e-13;
+/// Relative rounding error of the total energy, below which a decrease cannot be seen: the total is a small difference of the elements'
+/// energies and the work of the force.
+const ENERGY_ROUNDOFF: f64 = 1e-11;
 
 impl System<'_> {
     fn potential(&self, positions: &[f64], start: &[f64], drive: Drive, scratch: &mut Scratch) -> f64 {
