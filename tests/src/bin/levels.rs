@@ -87,7 +87,7 @@ fn main() -> Result<(), PredictError> {
             column.worst_um.push(errors.iter().copied().fold(0.0, f64::max));
             column.errors_um.extend(errors);
         }
-        eprint!("{}/{requests}", index + 1);
+        eprint!("\r{}/{requests}", index + 1);
     }
     eprintln!();
     println!(
