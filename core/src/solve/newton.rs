@@ -8,8 +8,7 @@
 //! Two ways to use the step ([`Globalization`]):
 //! - `PredictedStress`: full steps; the Hessian's stress-dependent part uses the stresses that the last linear step predicted
 //!   ([`crate::effect::Effect::predict_stress`]), and none while the residual is far from zero: stresses mean little there, and without
-//!   them the Hessian is positive definite. From an unloaded start it converges in six to nine steps where the guarded method needs
-//!   twice as many and raises the diagonal in half of them. Only inversion shortens a step. It may fail, and says so.
+//!   them the Hessian is positive definite. Only inversion shortens a step. Fast from a good start; it may fail, and says so.
 //! - `LineSearch`: the exact Hessian, and no step that increases Π or that an effect vetoes. Slow and sure.
 //!
 //! An unconverged state is an error with its residual, never an answer.
