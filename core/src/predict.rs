@@ -27,10 +27,10 @@ use crate::solve::newton;
 use beds::Beds;
 use choice::{Decision, Expected, decide};
 use finite_element::{Bench, COARSE, ContactEstimate, FiniteElementAnswer, Problem, REFERENCE, Resolution};
-use linear::{LinearAnswer, Load, press};
+use linear::{LinearAnswer, Load, Press, press};
 use topologies::shared_topology;
 
-/// Force over the needle's cross-section, in Young's moduli of the innermost retina, beyond which tissue models of this kind do not
+/// Normal force over the needle's cross-section, in Young's moduli of the innermost retina, beyond which tissue models of this kind do not
 /// hold: the needle punctures. Chosen where the finite-element levels still converge throughout; no puncture force of the retina is
 /// published.
 pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = 0.75;
@@ -192,7 +192,7 @@ impl Question<'_> {
             return Ok(self.at_rest(decision, "no force is applied"));
         }
         let press = press(self.patch(), &self.tool, &self.motion)?;
-        self.check_pressure()?;
+        self.check_pressure(&press)?;
         let closed = !matches!(press.load, Load::Depth(depth) if depth <= 0.0);
         if !closed {
             let decision = decide(&self.request.effects, self.request.level, still)?;
@@ -239,8 +239,8 @@ impl Question<'_> {
         tissue.retina_thickness_mm() + tissue.choroid.thickness_mm
     }
 
-    fn check_pressure(&self) -> Result<(), PredictError> {
-        if let Some(force_mn) = self.motion.force_mn {
+    fn check_pressure(&self, press: &Press) -> Result<(), PredictError> {
+        if let Load::Force(force_mn) = press.load {
             let radius_mm = self.tool.body.radius_mm();
             let pressure_kpa = force_mn / (std::f64::consts::PI * radius_mm * radius_mm);
             let softest = |low: f64, layer: &crate::tissue::Layer| low.min(layer.youngs_modulus_kpa);

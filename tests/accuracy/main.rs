@@ -26,7 +26,7 @@ fn scenes() -> HashMap<String, (PreparedScene, Vec<Point3<f64>>)> {
 #[test]
 fn levels_stay_within_their_stored_errors() {
     let (sample, scenes, mut workspace) = (held_out(), scenes(), Workspace::default());
-    assert!(sample.samples.len() >= 24, "{}", sample.samples.len());
+    assert!(sample.samples.len() >= 15, "{}", sample.samples.len());
     for level in [Level::Linear, Level::Coarse] {
         let mut errors = Vec::new();
         for stored in &sample.samples {

@@ -193,7 +193,7 @@ pub enum PredictError {
         "{force_mn} mN on a needle of {radius_mm} mm radius presses the tissue with {pressure_kpa:.1} kPa, beyond the limit of {limit_kpa:.1} kPa for this tissue (puncture)"
     )]
     BeyondPuncture {
-        /// Force [mN].
+        /// Force along the surface normal that the force asks for [mN].
         force_mn: f64,
         /// Needle radius [mm].
         radius_mm: f64,

@@ -1,7 +1,7 @@
 //! A needle on one bonded layer: Hertz and Dimitriadis at small strain, tables of another code's neo-Hookean slab.
 
 use nalgebra::{Isometry3, Vector3};
-use retina_core::equilibrium::{ContactSettings, Equilibrium, Motion, Solid, Tool, Wall};
+use retina_core::equilibrium::{ContactSettings, Equilibrium, MeshSize, Motion, Solid, Tool, Wall};
 use retina_core::mesh::disc::DiscGeometry;
 use retina_core::mesh::sample::locate;
 use retina_core::mesh::wall::{WallDivision, WallTopology};
@@ -56,7 +56,8 @@ impl Press {
     fn follow(&self, motions: &[(Option<f64>, f64)], mut see: impl FnMut(&Wall, &Equilibrium, usize)) {
         let body = self.shape.body();
         let tool = Tool { body: &body, patch_from_needle: Isometry3::identity() };
-        let wall = Wall::new(&self.topology, &Surface::Flat, &self.tissue, &self.disc, self.solid, self.contact, tool)
+        let mesh = MeshSize { disc: self.disc.clone(), first_element_mm: f64::INFINITY };
+        let wall = Wall::new(&self.topology, &Surface::Flat, &self.tissue, &mesh, self.solid, self.contact, tool)
             .expect("a wall");
         let mut workspace = Workspace::new(&self.topology.pattern, &self.topology.symbolic);
         let mut positions = wall.start();
