@@ -12,7 +12,7 @@ use crate::surface::Surface;
 /// First touch of needle and rest surface, patch frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touch {
-    /// Signed way of the needle along its direction until it touches [mm]; negative if it starts inside the tissue.
+    /// Signed way of the needle along its direction until it touches (mm); negative if it starts inside the tissue.
     pub travel_mm: f64,
     /// Patch parameters of the surface point.
     pub parameter: [f64; 2],
@@ -24,7 +24,7 @@ pub struct Touch {
 const MAX_ITERATIONS: usize = 40;
 /// Iterations of the ray against the surface.
 const RAY_ITERATIONS: usize = 30;
-/// Change of the touch point below which it is settled [mm].
+/// Change of the touch point below which it is settled (mm).
 const SETTLED_MM: f64 = 1e-7;
 /// Steepest direction against the surface normal for which a ray is followed (cosine of 89°).
 const SMALLEST_COSINE: f64 = 0.0175;

@@ -222,7 +222,7 @@ fn for_each_active(
     }
 }
 
-/// Total energy [µJ] at `positions` (x, y, z of each vertex); infinite if any effect vetoes them.
+/// Total energy (µJ) at `positions` (x, y, z of each vertex); infinite if any effect vetoes them.
 pub fn energy(terms: &[Term], positions: &[f64], scratch: &mut Scratch) -> f64 {
     let mut total = 0.0;
     for_each_active(terms, positions, &Predicted::default(), scratch, |_, term, local, _, _| {
@@ -231,7 +231,7 @@ pub fn energy(terms: &[Term], positions: &[f64], scratch: &mut Scratch) -> f64 {
     total
 }
 
-/// The gradient [mN] with respect to the free unknowns, then to the three border coordinates (`out`: free + 3 entries).
+/// The gradient (mN) with respect to the free unknowns, then to the three border coordinates (`out`: free + 3 entries).
 pub fn gradient(terms: &[Term], positions: &[f64], dofs: &Dofs, scratch: &mut Scratch, out: &mut [f64]) {
     out.fill(0.0);
     for_each_active(terms, positions, &Predicted::default(), scratch, |_, term, local, forces, _| {
@@ -249,7 +249,7 @@ pub fn gradient(terms: &[Term], positions: &[f64], dofs: &Dofs, scratch: &mut Sc
     });
 }
 
-/// The Hessian [mN/mm] in the layout of `pattern` (`values`: `pattern.len()` entries).
+/// The Hessian (mN/mm) in the layout of `pattern` (`values`: `pattern.len()` entries).
 pub fn hessian(
     terms: &[Term],
     positions: &[f64],

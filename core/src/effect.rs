@@ -11,7 +11,7 @@
 /// One group of vertices, as an effect sees it. All slices have length 3 × vertices of the group, component-major.
 #[derive(Clone, Copy, Debug)]
 pub struct Local<'a> {
-    /// Current positions [mm].
+    /// Current positions (mm).
     pub current: &'a [f64],
     /// Index of the group among the effect's stencils.
     pub group: usize,
@@ -30,13 +30,13 @@ pub trait Effect: Send + Sync {
         true
     }
 
-    /// Energy [µJ]; infinite where the position must not be accepted (an inverted element).
+    /// Energy (µJ); infinite where the position must not be accepted (an inverted element).
     fn energy(&self, local: &Local) -> f64;
 
-    /// Adds ∂energy/∂position [mN] to `out`; not a number where the energy is infinite.
+    /// Adds ∂energy/∂position (mN) to `out`; not a number where the energy is infinite.
     fn add_gradient(&self, local: &Local, out: &mut [f64]);
 
-    /// Adds ∂²energy/∂position² [mN/mm] to the lower triangle of `out`.
+    /// Adds ∂²energy/∂position² (mN/mm) to the lower triangle of `out`.
     fn add_hessian(&self, local: &Local, out: &mut [f64]);
 
     /// How many predicted stresses a group has (0: the effect has no stiff stresses worth predicting).

@@ -32,9 +32,9 @@ pub enum Solid {
 /// Numerical parameters of the contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSettings {
-    /// Penalty stiffness [kPa/mm].
+    /// Penalty stiffness (kPa/mm).
     pub stiffness_kpa_per_mm: f64,
-    /// Smoothing distance [mm].
+    /// Smoothing distance (mm).
     pub smoothing_mm: f64,
     /// Gauss points along each edge of a face.
     pub points_per_edge: usize,
@@ -45,7 +45,7 @@ pub struct ContactSettings {
 pub struct MeshSize {
     /// The disc around the contact.
     pub disc: DiscGeometry,
-    /// Thickness of the innermost element of the retina [mm], unless equal elements are thinner.
+    /// Thickness of the innermost element of the retina (mm), unless equal elements are thinner.
     pub first_element_mm: f64,
 }
 
@@ -63,9 +63,9 @@ pub struct Tool<'a> {
 pub struct Motion {
     /// Direction of advance.
     pub direction: Unit<Vector3<f64>>,
-    /// Force along it [mN]; `None`: the needle is advanced by `travel_mm` and held.
+    /// Force along it (mN); `None`: the needle is advanced by `travel_mm` and held.
     pub force_mn: Option<f64>,
-    /// Travel from the given pose: the target under pose control, a guess under force control [mm].
+    /// Travel from the given pose: the target under pose control, a guess under force control (mm).
     pub travel_mm: f64,
 }
 
@@ -92,11 +92,11 @@ struct Attempt {
 /// An equilibrium.
 #[derive(Clone, Debug)]
 pub struct Equilibrium {
-    /// Current positions of all vertices, the needle's tip last [mm].
+    /// Current positions of all vertices, the needle's tip last (mm).
     pub positions: Vec<f64>,
-    /// Travel of the needle from its given pose [mm].
+    /// Travel of the needle from its given pose (mm).
     pub travel_mm: f64,
-    /// Force of the tissue on the needle [mN].
+    /// Force of the tissue on the needle (mN).
     pub reaction_mn: Vector3<f64>,
     /// Cost of all load steps together.
     pub newton: NewtonReport,
@@ -107,11 +107,11 @@ pub struct Equilibrium {
 /// The contact of an equilibrium.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactSummary {
-    /// Rest area under pressure [mm²].
+    /// Rest area under pressure (mm²).
     pub area_mm2: f64,
-    /// Largest pressure [kPa].
+    /// Largest pressure (kPa).
     pub max_pressure_kpa: f64,
-    /// Deepest penetration [mm].
+    /// Deepest penetration (mm).
     pub max_penetration_mm: f64,
     /// Centre of pressure in patch parameters.
     pub center: [f64; 2],
@@ -119,9 +119,9 @@ pub struct ContactSummary {
 
 /// Residual relative to the force scale at which Newton stops.
 const RELATIVE_TOLERANCE: f64 = 1e-7;
-/// Force scale under pose control [mN]: that of a light touch.
+/// Force scale under pose control (mN): that of a light touch.
 const POSE_FORCE_SCALE_MN: f64 = 0.01;
-/// Smallest force scale [mN]: below it rounding of the tissue's stresses decides.
+/// Smallest force scale (mN): below it rounding of the tissue's stresses decides.
 const SMALLEST_FORCE_MN: f64 = 1e-7;
 /// What is tried, in this order: directly from the given start, then from first touch in load steps.
 const ATTEMPTS: [Attempt; 4] = [

@@ -38,7 +38,7 @@ pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = 0.75;
 /// Depth beyond which no answer is given, as a share of retina and choroid under the contact.
 pub const MAX_DEPTH_SHARE: f64 = 0.7;
 
-/// Penetration of the needle into the predicted surface from which on an answer warns of it [mm].
+/// Penetration of the needle into the predicted surface from which on an answer warns of it (mm).
 pub const PENETRATION_WARNING_MM: f64 = 5e-3;
 
 /// A scene with everything that depends on it alone. Shared between threads.
@@ -74,7 +74,7 @@ impl PreparedScene {
         &self.scene
     }
 
-    /// Memory that the preparation holds [bytes].
+    /// Memory that the preparation holds (bytes).
     pub fn memory_bytes(&self) -> usize {
         let mesh = match &self.scene.surface {
             SceneSurface::Mesh(mesh) => size_of_val(mesh.vertices()) + size_of_val(mesh.triangles()),
@@ -233,7 +233,7 @@ impl Question<'_> {
         answer
     }
 
-    /// Thickness of retina and choroid [mm].
+    /// Thickness of retina and choroid (mm).
     fn yielding_mm(&self) -> f64 {
         let tissue = &self.prepared.scene.tissue;
         tissue.retina_thickness_mm() + tissue.choroid.thickness_mm

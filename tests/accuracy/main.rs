@@ -11,7 +11,7 @@ use retina_core::progress::Silent;
 use retina_core::scene::Scene;
 use retina_tests::held_out::{HeldOut, PATH, prepare};
 
-/// Largest node difference of a recomputed reference [µm]: the solver's tolerance and another machine's rounding, a tenth of the
+/// Largest node difference of a recomputed reference (µm): the solver's tolerance and another machine's rounding, a tenth of the
 /// reference's own error.
 const RECOMPUTED_UM: f64 = 0.05;
 

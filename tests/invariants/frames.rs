@@ -7,7 +7,7 @@ use retina_tests::tolerance::RIGID_MOTION;
 
 use crate::support::{FAST, answered, ask, at, built_in, cap, largest_um, mesh_scene, motion, moved, requests};
 
-/// The largest difference between `answer` moved by `by` and `other` [mm], nodes and tip; normals and reaction are checked on the way.
+/// The largest difference between `answer` moved by `by` and `other` (mm), nodes and tip; normals and reaction are checked on the way.
 fn difference(answer: &Prediction, by: &Isometry3<f64>, other: &Prediction) -> f64 {
     for (normal, other) in answer.normals.iter().zip(&other.normals) {
         assert!((by * normal - other).norm() < 1e-5, "{normal} {other}");

@@ -47,7 +47,7 @@ fn surfaces_stay_surfaces_and_out_of_the_needle() {
     }
 }
 
-/// The largest difference between an answer over the grid's centre and its images under the square's symmetries [mm].
+/// The largest difference between an answer over the grid's centre and its images under the square's symmetries (mm).
 fn asymmetry(answer: &Prediction, rest: &[Point3<f64>]) -> f64 {
     let node = |i: usize, j: usize| answer.vertices[j * NODES_PER_SIDE + i] - rest[j * NODES_PER_SIDE + i];
     let last = NODES_PER_SIDE - 1;

@@ -68,7 +68,7 @@ pub fn force(request: &Request) -> Vector3<f64> {
     }
 }
 
-/// The largest displacement of a node [µm].
+/// The largest displacement of a node (µm).
 pub fn largest_um(answer: &Prediction) -> f64 {
     answer.displacement_um.iter().copied().fold(0.0, f64::max)
 }

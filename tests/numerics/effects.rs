@@ -21,7 +21,7 @@ struct Case {
     label: String,
     group: usize,
     current: Vec<f64>,
-    /// Step of the differences [mm].
+    /// Step of the differences (mm).
     step_mm: f64,
 }
 
@@ -146,7 +146,7 @@ struct Solids {
     size: f64,
 }
 
-/// Edges of an element [mm] before it is scaled and distorted.
+/// Edges of an element (mm) before it is scaled and distorted.
 const EDGES: [f64; 3] = [0.12, 0.1, 0.08];
 
 fn solids(size: f64) -> Solids {
@@ -235,7 +235,7 @@ fn check_finite_strain() {
     }
 }
 
-/// Needle radius of the contact rows [mm] before it is scaled.
+/// Needle radius of the contact rows (mm) before it is scaled.
 const RADIUS: f64 = 0.25;
 
 /// How the needle stands to a face: label, smoothing distance and least gap, in radii.

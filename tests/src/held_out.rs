@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 /// Where the sample lies.
 pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/held_out.json");
 
-/// Resolution of the stored displacements [µm]: far below the reference's own error.
+/// Resolution of the stored displacements (µm): far below the reference's own error.
 pub const ROUNDING_UM: f64 = 1e-3;
 
 /// The whole sample.
@@ -31,13 +31,13 @@ pub struct HeldOut {
 pub struct Limit {
     /// Name of the level.
     pub level: String,
-    /// Mean node error when the sample was made [µm].
+    /// Mean node error when the sample was made (µm).
     pub mean_um: f64,
-    /// Largest node error when the sample was made [µm].
+    /// Largest node error when the sample was made (µm).
     pub worst_um: f64,
-    /// Largest allowed mean node error [µm].
+    /// Largest allowed mean node error (µm).
     pub mean_limit_um: f64,
-    /// Largest allowed node error [µm].
+    /// Largest allowed node error (µm).
     pub worst_limit_um: f64,
 }
 
@@ -48,15 +48,15 @@ pub struct Sample {
     pub scene: String,
     /// `hemispherical`, `flat` or `bevelled`, edge and angle at their defaults.
     pub tip: String,
-    /// Needle radius [mm].
+    /// Needle radius (mm).
     pub radius_mm: f64,
-    /// Foremost point before the motion [mm].
+    /// Foremost point before the motion (mm).
     pub tip_mm: [f64; 3],
     /// Orientation, x, y, z, w.
     pub orientation_xyzw: [f64; 4],
-    /// Force [mN].
+    /// Force (mN).
     pub force_mn: [f64; 3],
-    /// Displacement of each node by level `reference` [µm].
+    /// Displacement of each node by level `reference` (µm).
     pub reference_um: Vec<[f64; 3]>,
 }
 
@@ -96,14 +96,14 @@ impl Sample {
         Request { needle, control, level, effects: EffectChoice::Auto }
     }
 
-    /// Distances of the answer's nodes to the stored reference [µm], given the nodes at rest.
+    /// Distances of the answer's nodes to the stored reference (µm), given the nodes at rest.
     pub fn errors_um(&self, rest: &[Point3<f64>], answer: &Prediction) -> Vec<f64> {
         let moved = displacements_um(rest, answer);
         moved.iter().zip(&self.reference_um).map(|(a, b)| (a - Vector3::from(*b)).norm()).collect()
     }
 }
 
-/// Displacement of every node [µm].
+/// Displacement of every node (µm).
 pub fn displacements_um(rest: &[Point3<f64>], answer: &Prediction) -> Vec<Vector3<f64>> {
     answer.vertices.iter().zip(rest).map(|(vertex, rest)| (vertex - rest) * 1e3).collect()
 }

@@ -12,7 +12,7 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
     sorted[low] + (at - low as f64) * (sorted[high] - sorted[low])
 }
 
-/// Distances between corresponding nodes [µm].
+/// Distances between corresponding nodes (µm).
 pub fn node_errors_um(a: &[Point3<f64>], b: &[Point3<f64>]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| (a - b).norm() * 1e3).collect()
 }

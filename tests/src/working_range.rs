@@ -12,11 +12,11 @@ use retina_core::tissue::Tissue;
 
 /// Gauges of the working range.
 pub const GAUGES: [&str; 4] = ["41G", "27G", "25G", "23G"];
-/// Tip positions reach this far from the patch's centre [mm].
+/// Tip positions reach this far from the patch's centre (mm).
 const REACH_MM: f64 = 0.8;
-/// Largest tilt of the needle [degrees].
+/// Largest tilt of the needle (degrees).
 const MAX_TILT_DEG: f64 = 60.0;
-/// Largest angle between needle and force [degrees].
+/// Largest angle between needle and force (degrees).
 const MAX_FORCE_ANGLE_DEG: f64 = 15.0;
 /// Smallest force over cross-section, in Young's moduli of the retina.
 const SMALLEST_PRESSURE: f64 = 0.02;
@@ -40,7 +40,7 @@ impl WorkingRange {
         low + (high - low) * self.random.f64()
     }
 
-    /// The radius of a gauge drawn at random [mm].
+    /// The radius of a gauge drawn at random (mm).
     pub fn radius_mm(&mut self) -> f64 {
         let gauge = self.random.choice(GAUGES).unwrap_or(GAUGES[0]);
         Gauge::from_name(gauge).map_or(0.25, |g| g.radius_mm())

@@ -24,7 +24,7 @@ pub const NAME: &str = "contact";
 pub struct ContactFaces {
     /// Shape function values, indexed (point, node).
     values: Vec<f64>,
-    /// Quadrature weight × rest area [mm²], indexed (face, point).
+    /// Quadrature weight × rest area (mm²), indexed (face, point).
     areas: Vec<f64>,
     /// Quadrature points per face.
     pub points: usize,
@@ -67,7 +67,7 @@ impl ContactFaces {
         &self.values[point * FACE_NODES..(point + 1) * FACE_NODES]
     }
 
-    /// Weight × rest area of the quadrature points of one face [mm²].
+    /// Weight × rest area of the quadrature points of one face (mm²).
     pub fn areas(&self, face: usize) -> &[f64] {
         &self.areas[face * self.points..(face + 1) * self.points]
     }
@@ -81,27 +81,27 @@ pub struct Contact<'a> {
     pub shape: &'a Body,
     /// The needle's orientation in the frame of the positions.
     pub frame_from_needle: Rotation3<f64>,
-    /// Penalty stiffness k [kPa/mm].
+    /// Penalty stiffness k (kPa/mm).
     pub stiffness_kpa_per_mm: f64,
-    /// Smoothing distance s [mm].
+    /// Smoothing distance s (mm).
     pub smoothing_mm: f64,
 }
 
 /// State of one quadrature point in contact.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactPoint {
-    /// Signed distance to the needle [mm], negative inside.
+    /// Signed distance to the needle (mm), negative inside.
     pub gap_mm: f64,
-    /// Contact pressure per rest area [kPa].
+    /// Contact pressure per rest area (kPa).
     pub pressure_kpa: f64,
-    /// Rest area of the point [mm²].
+    /// Rest area of the point (mm²).
     pub area_mm2: f64,
-    /// Deformed position [mm].
+    /// Deformed position (mm).
     pub position: Point3<f64>,
 }
 
 impl Contact<'_> {
-    /// φ, φ′ and φ″ [kPa·mm, kPa, kPa/mm] at gap `g` [mm].
+    /// φ, φ′ and φ″ (kPa·mm, kPa, kPa/mm) at gap `g` (mm).
     fn penalty(&self, g: f64) -> (f64, f64, f64) {
         let (k, s) = (self.stiffness_kpa_per_mm, self.smoothing_mm);
         if g >= s {

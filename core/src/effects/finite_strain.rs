@@ -32,7 +32,7 @@ pub enum NeoHookean {
     Isochoric,
 }
 
-/// Lamé constants of one element [kPa].
+/// Lamé constants of one element (kPa).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lame {
     /// Shear modulus µ.

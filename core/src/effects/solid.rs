@@ -31,7 +31,7 @@ pub enum SolidGeometryError {
         element: usize,
         /// Quadrature point index.
         point: usize,
-        /// The offending Jacobian determinant [mm³].
+        /// The offending Jacobian determinant (mm³).
         jacobian: f64,
     },
 }
@@ -39,18 +39,18 @@ pub enum SolidGeometryError {
 /// Rest geometry of every element of a stencil set.
 #[derive(Clone, Debug)]
 pub struct SolidGeometry {
-    /// ∂N/∂X [1/mm], indexed (element, point).
+    /// ∂N/∂X (1/mm), indexed (element, point).
     gradients: Vec<NodeRows>,
-    /// Quadrature weight × rest Jacobian [mm³], indexed (element, point).
+    /// Quadrature weight × rest Jacobian (mm³), indexed (element, point).
     weights: Vec<f64>,
     /// Pressure modes at the quadrature points of the reference element.
     mode_values: [[f64; MODES]; POINTS],
-    /// Inverse of the rest-volume mass matrix of the pressure modes [1/mm³], one per element.
+    /// Inverse of the rest-volume mass matrix of the pressure modes (1/mm³), one per element.
     mode_inverse: Vec<Matrix4<f64>>,
 }
 
 impl SolidGeometry {
-    /// Geometry of `stencils` at the rest positions (x, y, z of each vertex) [mm].
+    /// Geometry of `stencils` at the rest positions (x, y, z of each vertex) (mm).
     ///
     /// # Errors
     /// If an element is inverted or flat at rest.
@@ -89,13 +89,13 @@ impl SolidGeometry {
         Ok(SolidGeometry { gradients, weights, mode_values, mode_inverse })
     }
 
-    /// Rest gradients of the shape functions at one point: three rows (x, y, z) of one number per node [1/mm].
+    /// Rest gradients of the shape functions at one point: three rows (x, y, z) of one number per node (1/mm).
     #[inline(always)]
     pub fn gradients(&self, element: usize, point: usize) -> &NodeRows {
         &self.gradients[element * POINTS + point]
     }
 
-    /// Quadrature weights × rest Jacobian of one element [mm³].
+    /// Quadrature weights × rest Jacobian of one element (mm³).
     #[inline(always)]
     pub fn weights(&self, element: usize) -> &[f64] {
         &self.weights[element * POINTS..(element + 1) * POINTS]
@@ -141,7 +141,7 @@ impl SolidGeometry {
         integral
     }
 
-    /// Adds Σ_q Gᵀ·stress: `stress[q]` is the first Piola–Kirchhoff stress times the quadrature weight [mN·mm].
+    /// Adds Σ_q Gᵀ·stress: `stress[q]` is the first Piola–Kirchhoff stress times the quadrature weight (mN·mm).
     #[inline(always)]
     pub fn add_force(&self, element: usize, stress: &[Matrix3<f64>; POINTS], out: &mut [f64]) {
         let rows = out.as_chunks_mut::<NODES>().0;
@@ -241,7 +241,7 @@ impl SolidGeometry {
     }
 }
 
-/// Coefficients of the point-wise stiffness, quadrature weight included [mN·mm].
+/// Coefficients of the point-wise stiffness, quadrature weight included (mN·mm).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StiffnessCoefficients {
     /// Multiplies δᵢⱼ Gₐ·G_b.

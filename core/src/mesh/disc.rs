@@ -20,9 +20,9 @@ pub struct DiscTopology {
 /// Sizes of the disc around one contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiscGeometry {
-    /// Centre in patch parameters (x, y) [mm].
+    /// Centre in patch parameters (x, y) (mm).
     pub center: [f64; 2],
-    /// Outer radius of the core and of each ring [mm]: `rings` + 1 ascending numbers.
+    /// Outer radius of the core and of each ring (mm): `rings` + 1 ascending numbers.
     pub radii: Vec<f64>,
 }
 
@@ -89,7 +89,7 @@ impl DiscTopology {
         cells
     }
 
-    /// Position of every lattice point for the given sizes, in patch parameters [mm].
+    /// Position of every lattice point for the given sizes, in patch parameters (mm).
     ///
     /// # Panics
     /// If `geometry.radii` does not have one entry per ring and one for the core.

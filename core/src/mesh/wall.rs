@@ -148,21 +148,21 @@ impl WallTopology {
 /// One tissue layer as the mesh sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayerThickness {
-    /// Thickness at rest [mm].
+    /// Thickness at rest (mm).
     pub thickness_mm: f64,
     /// Whether the layer belongs to the retina and thins with it.
     pub thins: bool,
     /// Thickness of the innermost element, the others growing geometrically; the layer's thickness over the number of elements
-    /// where that is less [mm].
+    /// where that is less (mm).
     pub first_element_mm: f64,
 }
 
 /// Rest positions of one contact's mesh.
 #[derive(Clone, Debug)]
 pub struct WallGeometry {
-    /// Position of each disc lattice point in patch parameters [mm].
+    /// Position of each disc lattice point in patch parameters (mm).
     pub parameters: Vec<[f64; 2]>,
-    /// Rest positions of all vertices, x, y, z each, the needle's (zero here) last [mm].
+    /// Rest positions of all vertices, x, y, z each, the needle's (zero here) last (mm).
     pub rest: Vec<f64>,
     /// Depth of each vertex but the needle's in layers: 1.5 is the middle of the second layer.
     pub layer_coordinates: Vec<f64>,
@@ -204,9 +204,9 @@ impl WallGeometry {
 /// Where a lattice level lies at full thickness.
 #[derive(Clone, Copy, Debug, Default)]
 struct Level {
-    /// Depth within layers that thin [mm].
+    /// Depth within layers that thin (mm).
     thinning: f64,
-    /// Depth within the others [mm].
+    /// Depth within the others (mm).
     full: f64,
     /// Layers above it, the last one in part: 1.5 is the middle of the second layer.
     layer_coordinate: f64,

@@ -99,12 +99,12 @@ impl Body {
         }
     }
 
-    /// Where the axis of the shaft meets the local x axis [mm].
+    /// Where the axis of the shaft meets the local x axis (mm).
     pub fn axis_x_mm(&self) -> f64 {
         self.axis_x
     }
 
-    /// Radius of the shaft [mm].
+    /// Radius of the shaft (mm).
     pub fn radius_mm(&self) -> f64 {
         self.core_radius + self.edge_radius
     }

@@ -9,7 +9,7 @@ use crate::tissue::{LayerKind, Tissue};
 
 /// Thicknesses prepared for a surface with a pit.
 const PIT_BEDS: usize = 5;
-/// Memory of one prepared bed [bytes]: its tables, measured.
+/// Memory of one prepared bed (bytes): its tables, measured.
 const BED_BYTES: usize = 1 << 20;
 
 /// A bed with a given thinning of the retina.
@@ -39,7 +39,7 @@ impl Beds {
         Beds { tissue: scene.tissue.clone(), thinnings_mm, beds }
     }
 
-    /// Memory held when all are prepared [bytes].
+    /// Memory held when all are prepared (bytes).
     pub fn memory_bytes(&self) -> usize {
         self.beds.len() * BED_BYTES
     }

@@ -4,7 +4,7 @@ use super::types::{EffectChoice, EffectReport, Level, PredictError};
 use crate::effects::{EFFECT_NAMES, contact, elasticity, finite_strain};
 use crate::equilibrium::Solid;
 
-/// Error that `auto` accepts for leaving an effect out [µm]: a tenth of the best published tool-to-layer error (9 µm).
+/// Error that `auto` accepts for leaving an effect out (µm): a tenth of the best published tool-to-layer error (9 µm).
 pub const AUTO_TOLERANCE_UM: f64 = 1.0;
 
 /// The decision.
@@ -21,7 +21,7 @@ pub struct Decision {
 /// What the linear answer predicts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
-    /// Depth of the needle [mm].
+    /// Depth of the needle (mm).
     pub depth_mm: f64,
     /// That depth over the thickness of what yields (retina and choroid): a mean strain.
     pub strain: f64,

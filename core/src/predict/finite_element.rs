@@ -27,7 +27,7 @@ pub struct Resolution {
     pub sclera_elements: usize,
     /// Radius of the mesh's core in estimated contact radii.
     pub core_per_contact: f64,
-    /// Distance from the contact's edge to the fixed rim [mm].
+    /// Distance from the contact's edge to the fixed rim (mm).
     pub rim_mm: f64,
     /// The contact's numerical parameters.
     pub contact: ContactSettings,
@@ -80,11 +80,11 @@ impl Resolution {
 pub struct ContactEstimate {
     /// Patch parameters of its centre at equilibrium.
     pub center: [f64; 2],
-    /// Its radius [mm].
+    /// Its radius (mm).
     pub radius_mm: f64,
-    /// Travel of the needle at first touch [mm].
+    /// Travel of the needle at first touch (mm).
     pub touch_mm: f64,
-    /// Travel of the needle at equilibrium [mm].
+    /// Travel of the needle at equilibrium (mm).
     pub travel_mm: f64,
 }
 
@@ -94,11 +94,11 @@ const FIRST_ELEMENT_PER_CONTACT: f64 = 2.0;
 const SMALLEST_CONTACT: f64 = 0.05;
 /// The answer of a finite-element level, patch frame.
 pub struct FiniteElementAnswer {
-    /// Displacement of each node of the patch [mm].
+    /// Displacement of each node of the patch (mm).
     pub displacements: Vec<Vector3<f64>>,
-    /// Travel of the needle [mm].
+    /// Travel of the needle (mm).
     pub travel_mm: f64,
-    /// Force of the tissue on the needle [mN].
+    /// Force of the tissue on the needle (mN).
     pub reaction_mn: Vector3<f64>,
     /// The contact.
     pub contact: ContactReport,

@@ -14,7 +14,7 @@ use crate::layered::{Indentation, LayeredError, RigidProfile, SurfaceResponse};
 use crate::needle::Tip;
 use crate::patch::Patch;
 
-/// Largest angle of needle and force to the inward surface normal [degrees]: beyond it the shaft, which has no end here, lies down on
+/// Largest angle of needle and force to the inward surface normal (degrees): beyond it the shaft, which has no end here, lies down on
 /// the tissue.
 pub const MAX_ANGLE_DEG: f64 = 75.0;
 
@@ -25,16 +25,16 @@ pub struct Press {
     pub touch: Touch,
     /// Cosine between the direction of motion and the inward normal.
     pub cosine: f64,
-    /// Normal force [mN] or normal depth [mm].
+    /// Normal force (mN) or normal depth (mm).
     pub load: Load,
 }
 
 /// What is given along the normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Load {
-    /// Normal force [mN].
+    /// Normal force (mN).
     Force(f64),
-    /// Depth beyond first touch [mm].
+    /// Depth beyond first touch (mm).
     Depth(f64),
 }
 
@@ -91,13 +91,13 @@ fn shaft_first() -> PredictError {
 pub struct LinearAnswer<'a> {
     /// What presses.
     pub press: Press,
-    /// Depth along the normal [mm].
+    /// Depth along the normal (mm).
     pub depth_mm: f64,
-    /// Normal force [mN].
+    /// Normal force (mN).
     pub normal_force_mn: f64,
-    /// Contact radius [mm].
+    /// Contact radius (mm).
     pub contact_radius_mm: f64,
-    /// Largest mean pressure of a ring of the contact [kPa].
+    /// Largest mean pressure of a ring of the contact (kPa).
     pub max_pressure_kpa: f64,
     /// Centre of the contact at equilibrium, patch parameters.
     pub center: [f64; 2],
@@ -197,12 +197,12 @@ impl<'a> LinearAnswer<'a> {
         Ok(answer)
     }
 
-    /// Travel of the needle at equilibrium [mm].
+    /// Travel of the needle at equilibrium (mm).
     pub fn travel_mm(&self) -> f64 {
         self.press.touch.travel_mm + self.depth_mm / self.press.cosine
     }
 
-    /// Displacement of the surface point with these patch parameters [mm].
+    /// Displacement of the surface point with these patch parameters (mm).
     pub fn displacement(&self, [x, y]: [f64; 2]) -> Vector3<f64> {
         let inward = self.press.touch.inward.into_inner();
         let offset = Vector3::new(x - self.center[0], y - self.center[1], 0.0);

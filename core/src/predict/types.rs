@@ -37,7 +37,7 @@ impl Level {
 /// What is given about the needle's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Control {
-    /// The needle advances along this force until the tissue's reaction along it equals the force [mN].
+    /// The needle advances along this force until the tissue's reaction along it equals the force (mN).
     Force(Vector3<f64>),
     /// The needle stays where it is; the reaction is the answer.
     Pose,
@@ -80,11 +80,11 @@ pub enum ContactState {
 /// Where the needle ends up and what holds it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NeedleOutcome {
-    /// Foremost point [mm].
+    /// Foremost point (mm).
     pub tip_mm: Point3<f64>,
-    /// Advance along the force from where it was given [mm]; zero under pose control.
+    /// Advance along the force from where it was given (mm); zero under pose control.
     pub travel_mm: f64,
-    /// Force of the tissue on the needle [mN].
+    /// Force of the tissue on the needle (mN).
     pub reaction_mn: Vector3<f64>,
 }
 
@@ -93,11 +93,11 @@ pub struct NeedleOutcome {
 pub struct ContactReport {
     /// Whether there is any.
     pub state: ContactState,
-    /// Contact area, measured on the surface at rest [mm²].
+    /// Contact area, measured on the surface at rest (mm²).
     pub area_mm2: f64,
-    /// Largest contact pressure [kPa].
+    /// Largest contact pressure (kPa).
     pub max_pressure_kpa: f64,
-    /// Deepest penetration of the needle into the tissue that the contact law left [mm].
+    /// Deepest penetration of the needle into the tissue that the contact law left (mm).
     pub max_penetration_mm: f64,
     /// Largest principal stretch minus one, in magnitude, anywhere in the tissue (an estimate at level `linear`).
     pub max_strain: f64,
@@ -127,20 +127,20 @@ pub struct SolverReport {
     pub load_steps: usize,
     /// Unknowns of the last mesh.
     pub unknowns: usize,
-    /// Residual force at the end [mN].
+    /// Residual force at the end (mN).
     pub residual_mn: f64,
 }
 
 /// The answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prediction {
-    /// Deformed nodes [mm].
+    /// Deformed nodes (mm).
     pub vertices: Vec<Point3<f64>>,
     /// Unit normals of the deformed surface at the nodes, out of the tissue.
     pub normals: Vec<Vector3<f64>>,
     /// Triangles, counter-clockwise seen from the vitreous.
     pub triangles: Vec<[usize; 3]>,
-    /// Length of each node's displacement [µm].
+    /// Length of each node's displacement (µm).
     pub displacement_um: Vec<f64>,
     /// For a patch cut from a mesh: the mesh's index of each node.
     pub source_indices: Option<Vec<usize>>,
@@ -171,9 +171,9 @@ pub enum PredictError {
     PointsAway {
         /// `needle.direction` or `force_mn`.
         field: &'static str,
-        /// Angle to the inward normal at the contact [degrees].
+        /// Angle to the inward normal at the contact (degrees).
         angle_deg: f64,
-        /// Largest allowed angle [degrees].
+        /// Largest allowed angle (degrees).
         max_deg: f64,
     },
     /// The contact would lie outside of the patch.
@@ -181,11 +181,11 @@ pub enum PredictError {
         "the needle meets the tissue at ({x_mm:.3}, {y_mm:.3}) mm of the patch frame, outside of the patch (at most {limit_mm} mm from its centre in x and y)"
     )]
     OutsidePatch {
-        /// Contact point, patch frame [mm].
+        /// Contact point, patch frame (mm).
         x_mm: f64,
-        /// Contact point, patch frame [mm].
+        /// Contact point, patch frame (mm).
         y_mm: f64,
-        /// Largest allowed coordinate [mm].
+        /// Largest allowed coordinate (mm).
         limit_mm: f64,
     },
     /// The force would drive this needle beyond the depth for which the tissue model holds.
@@ -193,13 +193,13 @@ pub enum PredictError {
         "{force_mn} mN on a needle of {radius_mm} mm radius presses the tissue with {pressure_kpa:.1} kPa, beyond the limit of {limit_kpa:.1} kPa for this tissue (puncture)"
     )]
     BeyondPuncture {
-        /// Force along the surface normal that the force asks for [mN].
+        /// Force along the surface normal that the force asks for (mN).
         force_mn: f64,
-        /// Needle radius [mm].
+        /// Needle radius (mm).
         radius_mm: f64,
-        /// Force over the needle's cross-section [kPa].
+        /// Force over the needle's cross-section (kPa).
         pressure_kpa: f64,
-        /// Largest allowed value of it [kPa].
+        /// Largest allowed value of it (kPa).
         limit_kpa: f64,
     },
     /// The needle would go deeper into the tissue than the model holds for.
@@ -207,9 +207,9 @@ pub enum PredictError {
         "the needle would stand {depth_mm:.3} mm deep in the tissue (by linear elasticity), beyond the limit of {limit_mm:.3} mm"
     )]
     TooDeep {
-        /// Depth below the rest surface along its normal [mm].
+        /// Depth below the rest surface along its normal (mm).
         depth_mm: f64,
-        /// Largest allowed depth [mm].
+        /// Largest allowed depth (mm).
         limit_mm: f64,
     },
     /// An effect that does not exist, or that the level cannot do without.

@@ -30,7 +30,7 @@ pub enum Drive {
     Force {
         /// Unit direction of travel.
         direction: Vector3<f64>,
-        /// Force along it [mN].
+        /// Force along it (mN).
         force_mn: f64,
     },
 }
@@ -49,13 +49,13 @@ pub enum Globalization {
 pub struct NewtonSettings {
     /// How steps are guarded.
     pub globalization: Globalization,
-    /// Size of the forces at play [mN].
+    /// Size of the forces at play (mN).
     pub force_scale_mn: f64,
-    /// Largest residual force: Euclidean norm over all unknowns [mN].
+    /// Largest residual force: Euclidean norm over all unknowns (mN).
     pub tolerance_mn: f64,
     /// Largest number of iterations.
     pub max_iterations: usize,
-    /// Largest travel of the driven vertex in one iteration [mm].
+    /// Largest travel of the driven vertex in one iteration (mm).
     pub max_travel_mm: f64,
     /// Iterations at the beginning in which the driven vertex stays where it is: the tissue first adapts to a good guess of its
     /// travel, whose small misfits a stiff contact would answer with large forces.
@@ -71,7 +71,7 @@ pub struct NewtonReport {
     pub halvings: usize,
     /// Factorisations repeated with a raised diagonal.
     pub shifts: usize,
-    /// Residual force at the end [mN].
+    /// Residual force at the end (mN).
     pub residual_mn: f64,
 }
 
@@ -85,9 +85,9 @@ pub enum NewtonError {
     NotConverged {
         /// Iterations made.
         iterations: usize,
-        /// Residual force [mN].
+        /// Residual force (mN).
         residual_mn: f64,
-        /// Wanted residual [mN].
+        /// Wanted residual (mN).
         tolerance_mn: f64,
     },
     /// No part of the step was acceptable.
@@ -95,7 +95,7 @@ pub enum NewtonError {
     NoStep {
         /// Iterations made.
         iterations: usize,
-        /// Residual force [mN].
+        /// Residual force (mN).
         residual_mn: f64,
     },
     /// The starting position is vetoed by an effect.
@@ -139,7 +139,7 @@ pub struct System<'a> {
     pub symbolic: &'a SymbolicFactor,
     /// Index of the driven vertex, if any.
     pub driven: Option<usize>,
-    /// Constant forces on the free unknowns [mN]; empty for none.
+    /// Constant forces on the free unknowns (mN); empty for none.
     pub dead_load: &'a [f64],
 }
 
@@ -426,7 +426,7 @@ impl System<'_> {
     }
 }
 
-/// The force that holds the driven vertex, from the residual of the last evaluation [mN].
+/// The force that holds the driven vertex, from the residual of the last evaluation (mN).
 pub fn holding_force(workspace: &Workspace) -> Vector3<f64> {
     let free = workspace.residual.len() - 3;
     Vector3::from_row_slice(&workspace.residual[free..])

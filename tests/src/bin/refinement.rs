@@ -13,13 +13,13 @@ use retina_core::progress::Silent;
 use retina_core::scene::Scene;
 use retina_tests::statistics::node_errors_um;
 
-/// Gauges compared, with a force that indents the default tissue by about half the retina's thickness or more [mN].
+/// Gauges compared, with a force that indents the default tissue by about half the retina's thickness or more (mN).
 const CASES: [(&str, f64); 3] = [("41G", 0.08), ("25G", 1.0), ("23G", 1.4)];
-/// Where the needle stands, off every axis of symmetry and mesh line [mm].
+/// Where the needle stands, off every axis of symmetry and mesh line (mm).
 const TIP: [f64; 3] = [0.17, -0.23, 0.1];
 /// Where it points: tilted by 20°.
 const DIRECTION: [f64; 3] = [0.30, 0.18, -0.94];
-/// Change that is accepted: absolute [µm] and relative to the largest displacement.
+/// Change that is accepted: absolute (µm) and relative to the largest displacement.
 const ACCEPTED: (f64, f64) = (0.5, 0.01);
 
 fn refined(factor: f64) -> Resolution {

@@ -17,7 +17,7 @@ use retina_core::solve::sparse::SymbolicFactor;
 /// Rest positions of one element's nodes, in local order.
 pub type ElementNodes = [[f64; 3]; NODES];
 
-/// Nodes nearer than this are one node [mm].
+/// Nodes nearer than this are one node (mm).
 const GLUE_MM: f64 = 1e-6;
 /// Gauss points along each edge in loads and error norms: exact to degree 7, far beyond the element's own.
 const GAUSS_POINTS: usize = 4;

@@ -9,7 +9,7 @@ use super::block::{Body, Law, Mesh, block, lame};
 
 const LAWS: [Law; 3] = [Law::Linear, Law::NeoHookean(NeoHookean::Logarithmic), Law::NeoHookean(NeoHookean::Isochoric)];
 
-/// Residual of a solve that is to leave nothing but rounding [mN].
+/// Residual of a solve that is to leave nothing but rounding (mN).
 const RESIDUAL: f64 = 1e-10;
 
 fn on_boundary(at: Vector3<f64>) -> bool {

@@ -8,7 +8,7 @@ use retina_tests::stated_errors::{LINEAR_TABLE, LINEAR_TABLE_EDGE, NEO_HOOKEAN_T
 
 use super::block::{Body, Law, Mesh, lame, slab};
 
-/// A row of a table: radius, radial and normal displacement, what the normal one still moved between meshes [mm].
+/// A row of a table: radius, radial and normal displacement, what the normal one still moved between meshes (mm).
 type Row = [f64; 4];
 
 /// The cases of a table: the first `key` columns name the case, `columns` hold r, u_r, u_z and, if there is one, the change.
@@ -26,7 +26,7 @@ fn cases(table: &str, key: usize, columns: [usize; 4]) -> Vec<(Vec<String>, Vec<
     cases
 }
 
-/// Pressure at r of `disc` or `bump` of radius `size` and total force `force` [kPa].
+/// Pressure at r of `disc` or `bump` of radius `size` and total force `force` (kPa).
 fn pressure(kind: &str, size: f64, force: f64, r: f64) -> f64 {
     let share = (1.0 - (r / size).powi(2)).max(0.0);
     if kind == "disc" { force / (PI * size * size) } else { 3.0 * force / (PI * size * size) * share * share }
