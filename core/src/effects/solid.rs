@@ -4,7 +4,7 @@
 //! For a point energy W(F) whose second derivative has the form
 //! δᵢⱼ c_rest (Gₐ·G_b) + c_cross gₐⱼ g_bᵢ + c_outer gₐᵢ g_bⱼ, with G the rest gradients of the shape functions and g = F⁻ᵀG,
 //! the element matrix is a sum of outer products over quadrature points; [`SolidGeometry::add_stiffness`] is that sum.
-//! Loops have compile-time lengths and run under the widest vector instructions of the machine ([`run_kernel`]).
+//! Loops have compile-time lengths and run under the widest vector instructions of the machine (`run_kernel`).
 //! Not here: any material, any mesh topology.
 
 use nalgebra::{Matrix3, Matrix4, Vector4};
