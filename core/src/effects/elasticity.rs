@@ -7,7 +7,7 @@
 use nalgebra::Matrix3;
 
 use super::finite_strain::Lame;
-use super::solid::{ElementKernel, SolidGeometry, StiffnessCoefficients, run_kernel};
+use super::solid::{Energy, Gradient, Hessian, SolidEnergy, SolidGeometry, StiffnessCoefficients, run_kernel};
 use crate::effect::{Effect, Local};
 use crate::mesh::element::{NODES, POINTS};
 
@@ -35,7 +35,9 @@ impl Elasticity<'_> {
         }
         (strain, self.geometry.project(local.group, &trace))
     }
+}
 
+impl SolidEnergy for Elasticity<'_> {
     #[inline(always)]
     fn energy_n(&self, local: &Local) -> f64 {
         let (strain, trace) = self.strains(local);
@@ -73,39 +75,6 @@ impl Elasticity<'_> {
         }
         self.geometry.add_stiffness(local.group, &gradients, &coefficients, out);
         self.geometry.add_volumetric_stiffness(local.group, &gradients, &volumetric, out);
-    }
-}
-
-struct Energy<'a>(&'a Elasticity<'a>, &'a Local<'a>);
-
-impl ElementKernel for Energy<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run(self) -> f64 {
-        self.0.energy_n(self.1)
-    }
-}
-
-struct Gradient<'a>(&'a Elasticity<'a>, &'a Local<'a>, &'a mut [f64]);
-
-impl ElementKernel for Gradient<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.0.add_gradient_n(self.1, self.2)
-    }
-}
-
-struct Hessian<'a>(&'a Elasticity<'a>, &'a Local<'a>, &'a mut [f64]);
-
-impl ElementKernel for Hessian<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.0.add_hessian_n(self.1, self.2)
     }
 }
 

@@ -13,7 +13,9 @@
 
 use nalgebra::Matrix3;
 
-use super::solid::{ElementKernel, NodeRows, SolidGeometry, StiffnessCoefficients, run_kernel};
+use super::solid::{
+    ElementKernel, Energy, Gradient, Hessian, NodeRows, SolidEnergy, SolidGeometry, StiffnessCoefficients, run_kernel,
+};
 use crate::effect::{Effect, Local};
 use crate::mesh::element::{NODES, POINTS};
 
@@ -112,6 +114,106 @@ impl FiniteStrain<'_> {
         self.geometry.project(local.group, &pressure)
     }
 
+    /// The part −2/3 µ J^(−2/3) (fₐᵢ g_bⱼ + gₐᵢ f_bⱼ), f = F G, that only the isochoric energy has.
+    #[inline(always)]
+    fn add_mixed(&self, local: &Local, points: &Points, spatial: &[NodeRows; POINTS], out: &mut [f64]) {
+        let mu = self.materials[local.group].mu;
+        let rows = out.as_chunks_mut::<NODES>().0;
+        for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
+            let mut pushed = [[0.0; NODES]; 3];
+            push_forward(&points.f[q], self.geometry.gradients(local.group, q), &mut pushed);
+            let scale = -2.0 / 3.0 * weight * mu * points.j[q].powf(-2.0 / 3.0);
+            let g = &spatial[q];
+            for i in 0..3 {
+                for a in 0..NODES {
+                    for j in 0..=i {
+                        let row = &mut rows[(i * NODES + a) * 3 + j];
+                        for b in 0..NODES {
+                            row[b] += scale * (pushed[i][a] * g[j][b] + g[i][a] * pushed[j][b]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Projected pressure at the points after `step`, to first order: U′(θ) + U″(θ) dθ with dJ = J F⁻ᵀ : dF.
+    #[inline(always)]
+    fn predict_pressure_n(&self, local: &Local, step: &[f64], out: &mut [f64]) {
+        let Some(points) = self.points(local) else { return };
+        let mut change = [0.0; POINTS];
+        for q in 0..POINTS {
+            let df = self.geometry.deformation_gradient(local.group, q, step);
+            change[q] = points.j[q] * points.f_inverse_transposed[q].dot(&df);
+        }
+        let change = self.geometry.project(local.group, &change);
+        let mut pressure = [0.0; POINTS];
+        for q in 0..POINTS {
+            let (_, first, second) = self.volumetric(&self.materials[local.group], points.theta[q]);
+            pressure[q] = first + second * change[q];
+        }
+        out.copy_from_slice(&self.geometry.project(local.group, &pressure));
+    }
+
+    /// The largest t such that no point's J falls below a tenth of its value along `current + t step`.
+    #[inline(always)]
+    fn max_step_n(&self, local: &Local, step: &[f64]) -> f64 {
+        let mut largest = 1.0_f64;
+        for q in 0..POINTS {
+            let f = self.geometry.deformation_gradient(local.group, q, local.current);
+            let df = self.geometry.deformation_gradient(local.group, q, step);
+            let (j, _) = determinant_and_cofactor(&f);
+            while largest > f64::EPSILON && determinant_and_cofactor(&(f + df * largest)).0 <= SMALLEST_VOLUME_RATIO * j
+            {
+                largest *= 0.7;
+            }
+        }
+        largest
+    }
+}
+
+/// Determinant of a 3 × 3 matrix and its cofactor matrix J F⁻ᵀ.
+#[inline(always)]
+fn determinant_and_cofactor(f: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
+    let (c0, c1, c2) = (f.column(0), f.column(1), f.column(2));
+    let cofactor = Matrix3::from_columns(&[c1.cross(&c2), c2.cross(&c0), c0.cross(&c1)]);
+    (c0.dot(&cofactor.column(0)), cofactor)
+}
+
+/// `out` = matrix × gradients, node by node.
+#[inline(always)]
+fn push_forward(matrix: &Matrix3<f64>, gradients: &NodeRows, out: &mut NodeRows) {
+    for i in 0..3 {
+        for a in 0..NODES {
+            out[i][a] =
+                matrix[(i, 0)] * gradients[0][a] + matrix[(i, 1)] * gradients[1][a] + matrix[(i, 2)] * gradients[2][a];
+        }
+    }
+}
+
+struct PredictStress<'a>(&'a FiniteStrain<'a>, &'a Local<'a>, &'a [f64], &'a mut [f64]);
+
+impl ElementKernel for PredictStress<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.0.predict_pressure_n(self.1, self.2, self.3)
+    }
+}
+
+struct MaxStep<'a>(&'a FiniteStrain<'a>, &'a Local<'a>, &'a [f64]);
+
+impl ElementKernel for MaxStep<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        self.0.max_step_n(self.1, self.2)
+    }
+}
+
+impl SolidEnergy for FiniteStrain<'_> {
     #[inline(always)]
     fn energy_n(&self, local: &Local) -> f64 {
         let Some(points) = self.points(local) else { return f64::INFINITY };
@@ -195,137 +297,6 @@ impl FiniteStrain<'_> {
         if self.law == NeoHookean::Isochoric {
             self.add_mixed(local, &points, &spatial, out);
         }
-    }
-
-    /// The part −2/3 µ J^(−2/3) (fₐᵢ g_bⱼ + gₐᵢ f_bⱼ), f = F G, that only the isochoric energy has.
-    #[inline(always)]
-    fn add_mixed(&self, local: &Local, points: &Points, spatial: &[NodeRows; POINTS], out: &mut [f64]) {
-        let mu = self.materials[local.group].mu;
-        let rows = out.as_chunks_mut::<NODES>().0;
-        for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
-            let mut pushed = [[0.0; NODES]; 3];
-            push_forward(&points.f[q], self.geometry.gradients(local.group, q), &mut pushed);
-            let scale = -2.0 / 3.0 * weight * mu * points.j[q].powf(-2.0 / 3.0);
-            let g = &spatial[q];
-            for i in 0..3 {
-                for a in 0..NODES {
-                    for j in 0..=i {
-                        let row = &mut rows[(i * NODES + a) * 3 + j];
-                        for b in 0..NODES {
-                            row[b] += scale * (pushed[i][a] * g[j][b] + g[i][a] * pushed[j][b]);
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    /// Projected pressure at the points after `step`, to first order: U′(θ) + U″(θ) dθ with dJ = J F⁻ᵀ : dF.
-    #[inline(always)]
-    fn predict_pressure_n(&self, local: &Local, step: &[f64], out: &mut [f64]) {
-        let Some(points) = self.points(local) else { return };
-        let mut change = [0.0; POINTS];
-        for q in 0..POINTS {
-            let df = self.geometry.deformation_gradient(local.group, q, step);
-            change[q] = points.j[q] * points.f_inverse_transposed[q].dot(&df);
-        }
-        let change = self.geometry.project(local.group, &change);
-        let mut pressure = [0.0; POINTS];
-        for q in 0..POINTS {
-            let (_, first, second) = self.volumetric(&self.materials[local.group], points.theta[q]);
-            pressure[q] = first + second * change[q];
-        }
-        out.copy_from_slice(&self.geometry.project(local.group, &pressure));
-    }
-
-    /// The largest t such that no point's J falls below a tenth of its value along `current + t step`.
-    #[inline(always)]
-    fn max_step_n(&self, local: &Local, step: &[f64]) -> f64 {
-        let mut largest = 1.0_f64;
-        for q in 0..POINTS {
-            let f = self.geometry.deformation_gradient(local.group, q, local.current);
-            let df = self.geometry.deformation_gradient(local.group, q, step);
-            let (j, _) = determinant_and_cofactor(&f);
-            while largest > f64::EPSILON && determinant_and_cofactor(&(f + df * largest)).0 <= SMALLEST_VOLUME_RATIO * j
-            {
-                largest *= 0.7;
-            }
-        }
-        largest
-    }
-}
-
-/// Determinant of a 3 × 3 matrix and its cofactor matrix J F⁻ᵀ.
-#[inline(always)]
-fn determinant_and_cofactor(f: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
-    let (c0, c1, c2) = (f.column(0), f.column(1), f.column(2));
-    let cofactor = Matrix3::from_columns(&[c1.cross(&c2), c2.cross(&c0), c0.cross(&c1)]);
-    (c0.dot(&cofactor.column(0)), cofactor)
-}
-
-/// `out` = matrix × gradients, node by node.
-#[inline(always)]
-fn push_forward(matrix: &Matrix3<f64>, gradients: &NodeRows, out: &mut NodeRows) {
-    for i in 0..3 {
-        for a in 0..NODES {
-            out[i][a] =
-                matrix[(i, 0)] * gradients[0][a] + matrix[(i, 1)] * gradients[1][a] + matrix[(i, 2)] * gradients[2][a];
-        }
-    }
-}
-
-struct Energy<'a>(&'a FiniteStrain<'a>, &'a Local<'a>);
-
-impl ElementKernel for Energy<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run(self) -> f64 {
-        self.0.energy_n(self.1)
-    }
-}
-
-struct Gradient<'a>(&'a FiniteStrain<'a>, &'a Local<'a>, &'a mut [f64]);
-
-impl ElementKernel for Gradient<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.0.add_gradient_n(self.1, self.2)
-    }
-}
-
-struct Hessian<'a>(&'a FiniteStrain<'a>, &'a Local<'a>, &'a mut [f64]);
-
-impl ElementKernel for Hessian<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.0.add_hessian_n(self.1, self.2)
-    }
-}
-
-struct PredictStress<'a>(&'a FiniteStrain<'a>, &'a Local<'a>, &'a [f64], &'a mut [f64]);
-
-impl ElementKernel for PredictStress<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.0.predict_pressure_n(self.1, self.2, self.3)
-    }
-}
-
-struct MaxStep<'a>(&'a FiniteStrain<'a>, &'a Local<'a>, &'a [f64]);
-
-impl ElementKernel for MaxStep<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run(self) -> f64 {
-        self.0.max_step_n(self.1, self.2)
     }
 }
 

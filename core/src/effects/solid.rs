@@ -10,7 +10,7 @@
 use nalgebra::{Matrix3, Matrix4, Vector4};
 use thiserror::Error;
 
-use crate::effect::Stencils;
+use crate::effect::{Local, Stencils};
 use crate::mesh::element::{MODES, NODES, POINTS, QUADRATURE};
 
 /// One number per node for each component: a row of shape function gradients.
@@ -281,6 +281,52 @@ impl<K: ElementKernel> pulp::WithSimd for Dispatched<K> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _simd: S) -> K::Output {
         self.0.run()
+    }
+}
+
+/// What a solid effect computes on one element; implementations are `#[inline(always)]`.
+pub(super) trait SolidEnergy {
+    /// Energy (µJ).
+    fn energy_n(&self, local: &Local) -> f64;
+    /// Adds the gradient (mN).
+    fn add_gradient_n(&self, local: &Local, out: &mut [f64]);
+    /// Adds the Hessian's lower triangle (mN/mm).
+    fn add_hessian_n(&self, local: &Local, out: &mut [f64]);
+}
+
+/// The kernel of [`SolidEnergy::energy_n`].
+pub(super) struct Energy<'a, S>(pub &'a S, pub &'a Local<'a>);
+
+impl<S: SolidEnergy> ElementKernel for Energy<'_, S> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        self.0.energy_n(self.1)
+    }
+}
+
+/// The kernel of [`SolidEnergy::add_gradient_n`].
+pub(super) struct Gradient<'a, S>(pub &'a S, pub &'a Local<'a>, pub &'a mut [f64]);
+
+impl<S: SolidEnergy> ElementKernel for Gradient<'_, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.0.add_gradient_n(self.1, self.2)
+    }
+}
+
+/// The kernel of [`SolidEnergy::add_hessian_n`].
+pub(super) struct Hessian<'a, S>(pub &'a S, pub &'a Local<'a>, pub &'a mut [f64]);
+
+impl<S: SolidEnergy> ElementKernel for Hessian<'_, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.0.add_hessian_n(self.1, self.2)
     }
 }
 
