@@ -84,7 +84,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern for effects on these stencil sets (in this order in every later call).
+    /// The pattern for effects on these stencil sets, which [`Term::set`] counts in this order.
     pub fn new(dofs: &Dofs, stencils: &[&Stencils]) -> Self {
         let free = dofs.free;
         let mut columns: Vec<Vec<u32>> = vec![Vec::new(); free];
@@ -178,6 +178,13 @@ impl Predicted {
         Predicted { terms: terms.iter().map(|t| vec![0.0; t.effect.predicted_len() * t.stencils.len()]).collect() }
     }
 
+    /// Multiplies every stress.
+    pub fn scale(&mut self, factor: f64) {
+        for stress in self.terms.iter_mut().flatten() {
+            *stress *= factor;
+        }
+    }
+
     /// Forgets every stress.
     pub fn clear(&mut self) {
         for stresses in &mut self.terms {
@@ -259,13 +266,13 @@ pub fn hessian(
     values: &mut [f64],
 ) {
     values.fill(0.0);
-    for_each_active(terms, positions, predicted, scratch, |index, term, local, _, matrix| {
+    for_each_active(terms, positions, predicted, scratch, |_, term, local, _, matrix| {
         let n = 3 * term.stencils.group_size;
         matrix.clear();
         matrix.resize(n * n, 0.0);
         term.effect.add_hessian(local, matrix);
         let per_group = n * (n + 1) / 2;
-        let mut destinations = pattern.destinations[index][local.group * per_group..][..per_group].iter();
+        let mut destinations = pattern.destinations[term.set][local.group * per_group..][..per_group].iter();
         for row in 0..n {
             for (value, &destination) in matrix[row * n..=row * n + row].iter().zip(&mut destinations) {
                 if destination != SKIP {

@@ -100,4 +100,6 @@ pub struct Term<'a> {
     pub effect: &'a dyn Effect,
     /// Where it acts.
     pub stencils: &'a Stencils,
+    /// Which of the sets that the pattern was made for these stencils are: several effects may share one.
+    pub set: usize,
 }

@@ -5,13 +5,13 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
 
-use crate::effect::{Effect, Local, Term};
+use crate::effect::{Effect, Local};
 use crate::effects::contact::{Contact, ContactFaces};
 use crate::effects::elasticity::Elasticity;
 use crate::effects::finite_strain::{FiniteStrain, Lame, NeoHookean};
 use crate::mesh::disc::DiscGeometry;
 use crate::mesh::element::{NODES, POINTS};
-use crate::mesh::wall::{LayerThickness, WallError, WallGeometry, WallTopology};
+use crate::mesh::wall::{LayerThickness, Place, WallError, WallGeometry, WallTopology};
 use crate::needle::Body;
 use crate::progress::Progress;
 use crate::solve::newton::{
@@ -38,6 +38,21 @@ pub struct ContactSettings {
     pub smoothing_mm: f64,
     /// Gauss points along each edge of a face.
     pub points_per_edge: usize,
+    /// A first solve with this many times less stiffness and more smoothing leads to the contact proper; 1: none is needed. A stiff contact
+    /// on a fine mesh finds its points one by one, a soft one all at once.
+    pub softening: f64,
+}
+
+impl ContactSettings {
+    /// The contact of the first solve.
+    pub fn softened(&self) -> Self {
+        ContactSettings {
+            stiffness_kpa_per_mm: self.stiffness_kpa_per_mm / self.softening,
+            smoothing_mm: self.smoothing_mm * self.softening,
+            softening: 1.0,
+            ..*self
+        }
+    }
 }
 
 /// Where a mesh stands and how it is graded.
@@ -67,6 +82,26 @@ pub struct Motion {
     pub force_mn: Option<f64>,
     /// Travel from the given pose: the target under pose control, a guess under force control (mm).
     pub travel_mm: f64,
+}
+
+/// An effect besides the solid and the contact, and where it acts.
+#[derive(Clone, Copy)]
+pub struct Addition<'a> {
+    /// The energy.
+    pub effect: &'a dyn Effect,
+    /// Where it acts.
+    pub place: Place,
+}
+
+/// What is done to a wall.
+#[derive(Clone, Copy)]
+pub struct Load<'a> {
+    /// How the needle is driven.
+    pub motion: &'a Motion,
+    /// Travel of the needle at first touch of the tissue at rest (mm): where load steps begin, if they are needed.
+    pub touch_mm: f64,
+    /// What acts besides the needle's contact.
+    pub additions: &'a [Addition<'a>],
 }
 
 /// A meshed wall under a needle.
@@ -119,15 +154,17 @@ pub struct ContactSummary {
 
 /// Residual relative to the force scale at which Newton stops.
 const RELATIVE_TOLERANCE: f64 = 1e-7;
+/// The same in the first solve of a softened contact.
+const SOFTENED_TOLERANCE: f64 = 1e-3;
 /// Force scale under pose control (mN): that of a light touch.
 const POSE_FORCE_SCALE_MN: f64 = 0.01;
 /// Smallest force scale (mN): below it rounding of the tissue's stresses decides.
 const SMALLEST_FORCE_MN: f64 = 1e-7;
 /// What is tried, in this order: directly from the given start, then from first touch in load steps.
 const ATTEMPTS: [Attempt; 4] = [
-    Attempt { load_steps: 1, globalization: Globalization::PredictedStress, max_iterations: 25 },
-    Attempt { load_steps: 4, globalization: Globalization::PredictedStress, max_iterations: 18 },
-    Attempt { load_steps: 8, globalization: Globalization::PredictedStress, max_iterations: 20 },
+    Attempt { load_steps: 1, globalization: Globalization::PredictedStress, max_iterations: 45 },
+    Attempt { load_steps: 4, globalization: Globalization::PredictedStress, max_iterations: 30 },
+    Attempt { load_steps: 8, globalization: Globalization::PredictedStress, max_iterations: 30 },
     Attempt { load_steps: 12, globalization: Globalization::LineSearch, max_iterations: 100 },
 ];
 /// Iterations in which the needle waits for the tissue.
@@ -210,12 +247,16 @@ impl<'a> Wall<'a> {
     }
 
     fn contact(&self) -> Contact<'_> {
+        self.contact_with(&self.contact)
+    }
+
+    fn contact_with(&self, settings: &ContactSettings) -> Contact<'_> {
         Contact {
             faces: &self.faces,
             shape: self.tool.body,
             frame_from_needle: self.tool.patch_from_needle.rotation.to_rotation_matrix(),
-            stiffness_kpa_per_mm: self.contact.stiffness_kpa_per_mm,
-            smoothing_mm: self.contact.smoothing_mm,
+            stiffness_kpa_per_mm: settings.stiffness_kpa_per_mm,
+            smoothing_mm: settings.smoothing_mm,
         }
     }
 
@@ -262,15 +303,13 @@ impl<'a> Wall<'a> {
         None
     }
 
-    /// Finds the equilibrium of `motion` from the start `positions` (tissue and tip); load steps, if they are needed, begin at
-    /// first touch `touch_mm` with the tissue at rest.
+    /// Finds the equilibrium under `load` from the start `positions` (tissue and tip).
     ///
     /// # Errors
     /// The failure of the last attempt.
     pub fn solve(
         &self,
-        motion: &Motion,
-        touch_mm: f64,
+        load: &Load,
         positions: Vec<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
@@ -279,8 +318,8 @@ impl<'a> Wall<'a> {
         let mut failed_iterations = 0;
         let mut failure = NewtonError::Interrupted { iterations: 0 };
         for attempt in &ATTEMPTS {
-            let positions = start.take().unwrap_or_else(|| self.touching(motion, touch_mm));
-            match self.follow(motion, touch_mm, attempt, positions, workspace, progress) {
+            let positions = start.take().unwrap_or_else(|| self.touching(load));
+            match self.follow(load, attempt, positions, workspace, progress) {
                 Ok(mut equilibrium) => {
                     equilibrium.newton.iterations += failed_iterations;
                     return Ok(equilibrium);
@@ -296,47 +335,26 @@ impl<'a> Wall<'a> {
     }
 
     /// The tissue at rest and the needle just overlapping it.
-    fn touching(&self, motion: &Motion, touch_mm: f64) -> Vec<f64> {
+    fn touching(&self, load: &Load) -> Vec<f64> {
+        let Load { motion, touch_mm, .. } = *load;
         let mut positions = self.start();
         let overlap = FIRST_OVERLAP * (motion.travel_mm - touch_mm).max(0.0) + 2.0 * self.contact.smoothing_mm;
         self.place_tip(&mut positions, &(motion.direction.into_inner() * (touch_mm + overlap)));
         positions
     }
 
-    /// Follows equal load steps to the whole motion.
+    /// Follows equal load steps to the whole motion, with a softened contact if there is one, and ends with the contact proper.
     fn follow(
         &self,
-        motion: &Motion,
-        touch_mm: f64,
+        load: &Load,
         attempt: &Attempt,
         mut positions: Vec<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<Equilibrium, NewtonError> {
-        let solid = self.solid();
-        let contact = self.contact();
-        let terms = [
-            Term { effect: solid.as_ref(), stencils: &self.topology.elements },
-            Term { effect: &contact, stencils: &self.topology.faces },
-        ];
-        let system = System {
-            terms: &terms,
-            dofs: &self.topology.dofs,
-            pattern: &self.topology.pattern,
-            symbolic: &self.topology.symbolic,
-            driven: Some(self.topology.needle()),
-            dead_load: &[],
-        };
+        let Load { motion, touch_mm, .. } = *load;
         let direction = motion.direction.into_inner();
-        let scale = motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN).max(SMALLEST_FORCE_MN);
-        let settings = NewtonSettings {
-            globalization: attempt.globalization,
-            force_scale_mn: scale,
-            tolerance_mn: RELATIVE_TOLERANCE * scale,
-            max_iterations: attempt.max_iterations,
-            held_iterations: HELD_ITERATIONS,
-            max_travel_mm: MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
-        };
+        let softened = self.contact.softened();
         let mut total = NewtonReport::default();
         for step in 1..=attempt.load_steps {
             let share = step as f64 / attempt.load_steps as f64;
@@ -348,15 +366,53 @@ impl<'a> Wall<'a> {
                     Drive::Held
                 }
             };
-            let report = system.solve(&mut positions, drive, &settings, workspace, progress)?;
-            total = NewtonReport {
-                iterations: total.iterations + report.iterations,
-                halvings: total.halvings + report.halvings,
-                shifts: total.shifts + report.shifts,
-                residual_mn: report.residual_mn,
-            };
+            if self.contact.softening > 1.0 {
+                let drive = (drive, SOFTENED_TOLERANCE);
+                total += self.newton(&softened, drive, load, attempt, &mut positions, workspace, progress)?;
+            }
+            if self.contact.softening <= 1.0 || step == attempt.load_steps {
+                let drive = (drive, RELATIVE_TOLERANCE);
+                total += self.newton(&self.contact, drive, load, attempt, &mut positions, workspace, progress)?;
+            }
         }
         Ok(self.equilibrium(motion, positions, total, attempt.load_steps, workspace))
+    }
+
+    /// One Newton solve with this contact, to the given tolerance relative to the force scale.
+    #[allow(clippy::too_many_arguments)]
+    fn newton(
+        &self,
+        contact: &ContactSettings,
+        (drive, tolerance): (Drive, f64),
+        load: &Load,
+        attempt: &Attempt,
+        positions: &mut [f64],
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<NewtonReport, NewtonError> {
+        let solid = self.solid();
+        let contact = self.contact_with(contact);
+        let mut terms =
+            vec![self.topology.term(Place::Elements, solid.as_ref()), self.topology.term(Place::Faces, &contact)];
+        terms.extend(load.additions.iter().map(|addition| self.topology.term(addition.place, addition.effect)));
+        let system = System {
+            terms: &terms,
+            dofs: &self.topology.dofs,
+            pattern: &self.topology.pattern,
+            symbolic: &self.topology.symbolic,
+            driven: Some(self.topology.needle()),
+            dead_load: &[],
+        };
+        let scale = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN).max(SMALLEST_FORCE_MN);
+        let settings = NewtonSettings {
+            globalization: attempt.globalization,
+            force_scale_mn: scale,
+            tolerance_mn: tolerance * scale,
+            max_iterations: attempt.max_iterations,
+            held_iterations: HELD_ITERATIONS,
+            max_travel_mm: MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
+        };
+        system.solve(positions, drive, &settings, workspace, progress)
     }
 
     fn equilibrium(

@@ -1,5 +1,6 @@
 //! Linear and nonlinear solution: the sparse Cholesky factorisation (the one place that names faer's sparse code) and Newton's
 //! method on top of it.
 
+pub mod globalization;
 pub mod newton;
 pub mod sparse;

@@ -193,7 +193,7 @@ fn assembly_equals_a_dense_sum() {
     assert_eq!((dofs.index(0, 2), dofs.index(1, 1), dofs.index(8, 1)), (None, None, Some(dofs.free + 1)));
     let pattern = Pattern::new(&dofs, &[&stencils[0], &stencils[1]]);
     let effects = [Springs { size: 3 }, Springs { size: 2 }];
-    let terms = [0, 1].map(|t| Term { effect: &effects[t], stencils: &stencils[t] });
+    let terms = [0, 1].map(|t| Term { effect: &effects[t], stencils: &stencils[t], set: t });
     let mut random = noise(9);
     let positions: Vec<f64> = (0..27).map(|_| random()).collect();
     let n = dofs.free + 3;
@@ -254,7 +254,7 @@ fn solved(shift: f64) -> Result<f64, LinearSolveError> {
     let (dofs, stencils) = small();
     let pattern = Pattern::new(&dofs, &[&stencils[0], &stencils[1]]);
     let effects = [Springs { size: 3 }, Springs { size: 2 }];
-    let terms = [0, 1].map(|t| Term { effect: &effects[t], stencils: &stencils[t] });
+    let terms = [0, 1].map(|t| Term { effect: &effects[t], stencils: &stencils[t], set: t });
     let mut values = vec![0.0; pattern.len()];
     hessian(&terms, &[0.0; 27], &Predicted::default(), &pattern, &mut Scratch::default(), &mut values);
     let n = dofs.free;

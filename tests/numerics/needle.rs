@@ -227,6 +227,36 @@ fn underside_of_a_ball_and_of_a_flat_tip_have_closed_forms() {
 }
 
 #[test]
+fn a_tilted_edge_is_as_wide_by_area_as_its_two_curvatures_say() {
+    let shape = NeedleShape::flat(0.25);
+    let (body, edge) = (shape.body(), shape.edge_radius_mm());
+    let radii: Vec<f64> = (0..40).map(|i| 1e-4 * i as f64).collect();
+    for tilt_deg in [20.0_f64, 40.0, 60.0] {
+        let (sin, cos) = tilt_deg.to_radians().sin_cos();
+        let inward = Unit::new_normalize(Vector3::new(sin, 0.0, -cos));
+        let profile = body.underside_by_area(&inward, &radii).unwrap();
+        // Radii of curvature of a torus where its normal leans by the tilt.
+        let around = (0.25 - edge + edge * sin) / sin;
+        let expected = |radius: f64| radius * radius / (2.0 * (edge * around).sqrt());
+        // Sixteen azimuths integrate an ellipse of this aspect to a few per cent; the mean height would be off by a factor of two.
+        assert!((profile[20] / expected(radii[20]) - 1.0).abs() < 0.05, "{tilt_deg}: {}", profile[20]);
+        let lowest = body.foremost_along(&inward).unwrap();
+        let mean = body.underside_profile(&inward, &lowest, &radii).unwrap();
+        assert!(mean[20] > 1.5 * expected(radii[20]), "{tilt_deg}: {}", mean[20]);
+        assert!(profile.windows(2).all(|pair| pair[0] <= pair[1]));
+    }
+    // A round tip has the same height either way.
+    let ball = NeedleShape::hemispherical(0.25).body();
+    let inward = Unit::new_normalize(Vector3::new(0.3, 0.0, -1.0));
+    let lowest = ball.foremost_along(&inward).unwrap();
+    let (area, mean) =
+        (ball.underside_by_area(&inward, &radii).unwrap(), ball.underside_profile(&inward, &lowest, &radii).unwrap());
+    for (area, mean) in area.iter().zip(&mean) {
+        assert!((area - mean).abs() < 1e-9, "{area} {mean}");
+    }
+}
+
+#[test]
 fn a_needle_points_along_the_direction_asked_for() {
     let mut random = noise(5);
     let mut directions =

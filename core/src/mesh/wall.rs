@@ -12,7 +12,7 @@ use super::disc::{DiscGeometry, DiscTopology};
 use super::element::{NODE_OFFSETS, NODES, ORDER, TOP_NODES};
 use super::ordering::nested_dissection;
 use crate::assemble::{Dofs, Pattern};
-use crate::effect::Stencils;
+use crate::effect::{Effect, Stencils, Term};
 use crate::effects::solid::{SolidGeometry, SolidGeometryError};
 use crate::solve::sparse::{LinearSolveError, SymbolicFactor};
 use crate::surface::Column;
@@ -39,6 +39,15 @@ pub enum WallError {
     Linear(#[from] LinearSolveError),
 }
 
+/// Stencils of a wall that an effect can act on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The elements, [`WallTopology::elements`].
+    Elements,
+    /// The inner surface and the needle, [`WallTopology::faces`].
+    Faces,
+}
+
 /// Everything that depends on the division alone.
 #[derive(Debug)]
 pub struct WallTopology {
@@ -58,13 +67,21 @@ pub struct WallTopology {
     pub vertices: Vec<(usize, usize)>,
     /// Unknowns.
     pub dofs: Dofs,
-    /// Sparsity of solid and contact terms, in this order.
+    /// Sparsity of effects on each [`Place`].
     pub pattern: Pattern,
     /// The analysed factorisation.
     pub symbolic: SymbolicFactor,
 }
 
 impl WallTopology {
+    /// `effect` at `place`.
+    pub fn term<'a>(&'a self, place: Place, effect: &'a dyn Effect) -> Term<'a> {
+        match place {
+            Place::Elements => Term { effect, stencils: &self.elements, set: 0 },
+            Place::Faces => Term { effect, stencils: &self.faces, set: 1 },
+        }
+    }
+
     /// Builds the topology of `division`.
     ///
     /// # Errors

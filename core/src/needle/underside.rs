@@ -34,7 +34,6 @@ struct Walk {
     /// Radius and height of the last three hits, mm; the newest last.
     hits: [(f64, f64); 3],
     hit_count: usize,
-    missed: bool,
 }
 
 impl Walk {
@@ -48,14 +47,9 @@ impl Walk {
         h2 + (radius - r2) * (second + (radius - r1) * (second - first) / (r2 - r0))
     }
 
-    fn record(&mut self, radius: f64, height: Option<f64>) {
-        match height {
-            Some(height) => {
-                self.hits = [self.hits[1], self.hits[2], (radius, height)];
-                self.hit_count += 1;
-            }
-            None => self.missed = true,
-        }
+    fn record(&mut self, radius: f64, height: f64) {
+        self.hits = [self.hits[1], self.hits[2], (radius, height)];
+        self.hit_count += 1;
     }
 }
 
@@ -73,34 +67,93 @@ impl Body {
         about: &Point3<f64>,
         radii_mm: &[f64],
     ) -> Option<Vec<f64>> {
+        let walked = self.walk(inward_local, about, radii_mm)?;
+        let height = |index: usize| match mean_height(&walked, index) {
+            Some((height, share)) if share >= LEAST_HITS => height,
+            _ => f64::INFINITY,
+        };
+        Some((0..radii_mm.len()).map(height).collect())
+    }
+
+    /// The needle's height above its foremost point as that of the solid of revolution with the same area at each height; one height
+    /// for each of `radii_mm` (ascending), mm, infinite where the needle has not that much area.
+    ///
+    /// A tilted edge touches along an ellipse, and a ball of the geometric mean of its two radii of curvature, which has the same
+    /// areas, yields about as much under the same force (Johnson, *Contact Mechanics*, §4.2); the mean height would be that of
+    /// the sharper curvature. `None` when the direction does not point forwards.
+    pub fn underside_by_area(&self, inward_local: &Unit<Vector3<f64>>, radii_mm: &[f64]) -> Option<Vec<f64>> {
+        let walked = self.walk(inward_local, &self.foremost_along(inward_local)?, radii_mm)?;
+        // Squared radius of equal area up to the heights of a mean section; along each azimuth r² is linear between samples,
+        // which is exact for a parabola.
+        let mut sections = Vec::with_capacity(radii_mm.len());
+        let mut at = vec![0; walked.len()];
+        for index in 0..radii_mm.len() {
+            let Some((height, _)) = mean_height(&walked, index) else { break };
+            let mut area = 0.0;
+            for ((weight, heights), at) in walked.iter().zip(&mut at) {
+                while *at + 1 < heights.len() && heights[*at + 1] <= height {
+                    *at += 1;
+                }
+                let squared = radii_mm[*at] * radii_mm[*at];
+                let rest = match heights.get(*at + 1) {
+                    Some(next) if *next > heights[*at] => {
+                        let part = (height - heights[*at]) / (next - heights[*at]);
+                        part * (radii_mm[*at + 1] * radii_mm[*at + 1] - squared)
+                    }
+                    _ => 0.0,
+                };
+                area += weight * (squared + rest);
+            }
+            if sections.last().is_none_or(|&(before, _)| area > before) {
+                sections.push((area, height));
+            }
+        }
+        let mut upper = 0;
+        let profile = radii_mm.iter().map(|radius| {
+            let area = radius * radius;
+            while upper < sections.len() && sections[upper].0 < area {
+                upper += 1;
+            }
+            match (upper.checked_sub(1).map(|lower| sections[lower]), sections.get(upper)) {
+                (_, None) => f64::INFINITY,
+                (None, Some(&(_, height))) => height,
+                (Some((a0, h0)), Some(&(a1, h1))) => h0 + (area - a0) / (a1 - a0) * (h1 - h0),
+            }
+        });
+        Some(profile.collect())
+    }
+
+    /// Along each azimuth: its share in an average, and its heights above the foremost point at `radii_mm` until it misses, mm.
+    fn walk(
+        &self,
+        inward_local: &Unit<Vector3<f64>>,
+        about: &Point3<f64>,
+        radii_mm: &[f64],
+    ) -> Option<Vec<(f64, Vec<f64>)>> {
         let lowest = self.foremost_along(inward_local)?;
         let up = -inward_local.into_inner();
         let base = about - up * up.dot(&(about - lowest));
         let across = lateral_axis(&up);
-        let azimuths = self.azimuths(&up, &across, &base);
-        let mut walks = [Walk::default(); AZIMUTHS];
-        let mut previous = 0.0;
-        let mut heights = Vec::with_capacity(radii_mm.len());
-        for &radius in radii_mm {
-            if radius < previous {
-                walks = [Walk::default(); AZIMUTHS];
-            }
-            previous = radius;
-            let (mut sum, mut hits) = (0.0, 0.0);
-            for (walk, (direction, weight)) in walks.iter_mut().zip(&azimuths) {
-                if walk.missed {
-                    continue;
+        let walk = |(direction, weight): (Vector3<f64>, f64)| {
+            let mut walk = Walk::default();
+            let mut heights = Vec::with_capacity(radii_mm.len());
+            let mut previous = 0.0;
+            for &radius in radii_mm {
+                if radius < previous {
+                    walk = Walk::default();
                 }
-                let height = self.height_on_ray(&(base + direction * radius), &up, walk.guess(radius));
-                walk.record(radius, height);
-                if let Some(height) = height {
-                    sum += weight * height;
-                    hits += weight;
+                previous = radius;
+                match self.height_on_ray(&(base + direction * radius), &up, walk.guess(radius)) {
+                    Some(height) => {
+                        walk.record(radius, height);
+                        heights.push(height);
+                    }
+                    None => break,
                 }
             }
-            heights.push(if hits >= LEAST_HITS { sum / hits } else { f64::INFINITY });
-        }
-        Some(heights)
+            (weight, heights)
+        };
+        Some(self.azimuths(&up, &across, &base).into_iter().map(walk).collect())
     }
 
     /// The lateral directions to walk and the share of each in the average; mirrored and equal directions are walked once.
@@ -158,6 +211,13 @@ impl Body {
         }
         None
     }
+}
+
+/// Mean height at one radius over the azimuths that meet the needle there, and their share.
+fn mean_height(walked: &[(f64, Vec<f64>)], index: usize) -> Option<(f64, f64)> {
+    let hits = walked.iter().filter_map(|(weight, heights)| Some((weight, heights.get(index)?)));
+    let (sum, share) = hits.fold((0.0, 0.0), |(sum, share), (w, height)| (sum + w * height, share + w));
+    (share > 0.0).then(|| (sum / share, share))
 }
 
 /// A unit vector across `up`: towards the shaft's lean, or the needle's own x where the shaft stands upright.

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::types::{ContactReport, ContactState, PredictError, SolverReport};
-use crate::equilibrium::{ContactSettings, ContactSummary, Equilibrium, MeshSize, Motion, Solid, Tool, Wall};
+use crate::equilibrium::{ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Tool, Wall};
 use crate::mesh::disc::DiscGeometry;
 use crate::mesh::sample::locate;
 use crate::mesh::wall::{WallDivision, WallTopology};
@@ -42,7 +42,7 @@ pub const COARSE: Resolution = Resolution {
     sclera_elements: 0,
     core_per_contact: 0.8,
     rim_mm: 1.5,
-    contact: ContactSettings { stiffness_kpa_per_mm: 5e4, smoothing_mm: 5e-4, points_per_edge: 3 },
+    contact: ContactSettings { stiffness_kpa_per_mm: 4e4, smoothing_mm: 2e-3, points_per_edge: 5, softening: 1.0 },
 };
 
 /// Level `reference`.
@@ -54,7 +54,7 @@ pub const REFERENCE: Resolution = Resolution {
     sclera_elements: 1,
     core_per_contact: 1.0,
     rim_mm: 2.0,
-    contact: ContactSettings { stiffness_kpa_per_mm: 3e5, smoothing_mm: 2e-4, points_per_edge: 4 },
+    contact: ContactSettings { stiffness_kpa_per_mm: 3e5, smoothing_mm: 2e-4, points_per_edge: 4, softening: 10.0 },
 };
 
 impl Resolution {
@@ -172,7 +172,7 @@ impl Problem<'_> {
                 let beyond = (estimate.travel_mm - estimate.touch_mm).max(0.0);
                 let area = std::f64::consts::PI
                     * estimate.radius_mm.max(SMALLEST_CONTACT * self.tool.body.radius_mm()).powi(2);
-                let overlap = force_mn / area / resolution.contact.stiffness_kpa_per_mm;
+                let overlap = force_mn / area / resolution.contact.softened().stiffness_kpa_per_mm;
                 Motion { travel_mm: touch_mm + beyond + overlap, ..self.motion }
             }
             None => self.motion,
@@ -181,7 +181,7 @@ impl Problem<'_> {
         wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm));
         progress.stage("equilibrium");
         let equilibrium = wall
-            .solve(&motion, touch_mm, positions, workspace, progress)
+            .solve(&Load { motion: &motion, touch_mm, additions: &[] }, positions, workspace, progress)
             .map_err(|cause| PredictError::Solver { level, cause })?;
         progress.stage("surface");
         Ok(self.answer(&wall, &equilibrium, touch_mm))

@@ -38,6 +38,24 @@ pub enum Load {
     Depth(f64),
 }
 
+/// The part of the needle that a contact is centred on, by a point in needle coordinates.
+enum Support {
+    /// A round tip's foremost point.
+    Ball(Point3<f64>),
+    /// The foremost point of an edge: an elongated contact.
+    Edge(Point3<f64>),
+    /// The middle of the end face.
+    Face(Point3<f64>),
+}
+
+impl Support {
+    fn point(&self) -> &Point3<f64> {
+        match self {
+            Support::Ball(point) | Support::Edge(point) | Support::Face(point) => point,
+        }
+    }
+}
+
 /// Finds the first touch and checks that the motion makes sense.
 ///
 /// # Errors
@@ -121,12 +139,14 @@ impl<'a> LinearAnswer<'a> {
         let foremost = tool.body.foremost_along(&inward).ok_or_else(shaft_first)?;
         // A tilted flat tip stands on its rim under a light load and on its face under a heavy one: whichever yields less.
         let supports = match tip {
-            Tip::Hemispherical => vec![foremost],
-            Tip::Flat { .. } | Tip::Bevelled { .. } => vec![foremost, Point3::new(tool.body.axis_x_mm(), 0.0, 0.0)],
+            Tip::Hemispherical => vec![Support::Ball(foremost)],
+            Tip::Flat { .. } | Tip::Bevelled { .. } => {
+                vec![Support::Edge(foremost), Support::Face(Point3::new(tool.body.axis_x_mm(), 0.0, 0.0))]
+            }
         };
         let mut best: Option<Self> = None;
         for support in supports {
-            let offset = tool.patch_from_needle.rotation * (support - foremost);
+            let offset = tool.patch_from_needle.rotation * (support.point() - foremost);
             let answer = match Self::about(beds, patch, tool, press, direction, &inward, &support, &offset) {
                 // The second support may have no underside around it (the axis of a bevel seen from its side).
                 Err(_) if best.is_some() => continue,
@@ -147,8 +167,7 @@ impl<'a> LinearAnswer<'a> {
         }
     }
 
-    /// The answer for a contact around the axis through `support` (needle coordinates), which lies `offset` from the foremost point
-    /// (patch coordinates).
+    /// The answer for a contact around `support`, which lies `offset` from the foremost point (patch coordinates).
     #[allow(clippy::too_many_arguments)]
     fn about(
         beds: &'a Beds,
@@ -157,7 +176,7 @@ impl<'a> LinearAnswer<'a> {
         press: Press,
         direction: &Unit<Vector3<f64>>,
         inward: &Unit<Vector3<f64>>,
-        support: &Point3<f64>,
+        support: &Support,
         offset: &Vector3<f64>,
     ) -> Result<Self, PredictError> {
         let failed = |error: LayeredError| PredictError::Linear(error.to_string());
@@ -174,8 +193,12 @@ impl<'a> LinearAnswer<'a> {
         };
         for (bed, weight) in beds.around(thinning)? {
             let linear = &bed.linear;
-            let heights =
-                tool.body.underside_profile(inward, support, linear.sample_radii_mm()).ok_or_else(shaft_first)?;
+            let radii_mm = linear.sample_radii_mm();
+            let heights = match support {
+                Support::Edge(_) => tool.body.underside_by_area(inward, radii_mm),
+                Support::Ball(about) | Support::Face(about) => tool.body.underside_profile(inward, about, radii_mm),
+            }
+            .ok_or_else(shaft_first)?;
             // The bed counts its depth from the profile's lowest point, this answer from the needle's.
             let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
             let profile = RigidProfile { heights_mm: &heights, edge: None };

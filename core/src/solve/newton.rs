@@ -2,22 +2,22 @@
 //!
 //! Sought is a stationary point of Π(x, s) = Σ energies − F s over the free positions x and, under force control, the travel s of the
 //! driven vertex along a unit direction d. Each step factorises the Hessian of the free part; the travel is eliminated by the bordering
-//! method (two right-hand sides, one factor). Where the Hessian is not positive definite its diagonal is raised until it is, and only then
+//! method (two right-hand sides, one factor). Where the Hessian is not positive definite it is changed until it is, and only then
 //! (projecting always would cost the quadratic convergence of nearly incompressible elements).
 //!
-//! Two ways to use the step ([`Globalization`]):
-//! - `PredictedStress`: full steps; the Hessian's stress-dependent part uses the stresses that the last linear step predicted
-//!   ([`crate::effect::Effect::predict_stress`]), and none while the residual is far from zero: stresses mean little there, and without
-//!   them the Hessian is positive definite. Only inversion shortens a step. Fast from a good start; it may fail, and says so.
-//! - `LineSearch`: the exact Hessian, and no step that increases Π or that an effect vetoes. Slow and sure.
+//! How a step is used, and kept from going astray, is [`Globalization`]'s business (`globalization.rs`).
 //!
 //! An unconverged state is an error with its residual, never an answer.
+
+use std::ops::AddAssign;
 
 use nalgebra::Vector3;
 use thiserror::Error;
 
+pub use super::globalization::Globalization;
+use super::globalization::{Step, Trial};
 use super::sparse::{Factor, LinearSolveError, SymbolicFactor, norm};
-use crate::assemble::{Dofs, Pattern, Predicted, Scratch, energy, gradient, hessian, max_step, predict_stress};
+use crate::assemble::{Dofs, Pattern, Scratch, energy, gradient};
 use crate::effect::Term;
 use crate::progress::Progress;
 
@@ -33,15 +33,6 @@ pub enum Drive {
         /// Force along it (mN).
         force_mn: f64,
     },
-}
-
-/// How steps are kept from going astray.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Globalization {
-    /// Full steps with predicted stresses.
-    PredictedStress,
-    /// Exact Hessian and a line search on Π.
-    LineSearch,
 }
 
 /// How to solve and when to stop.
@@ -69,10 +60,20 @@ pub struct NewtonReport {
     pub iterations: usize,
     /// Step halvings in the line search.
     pub halvings: usize,
-    /// Factorisations repeated with a raised diagonal.
+    /// Factorisations repeated because the Hessian was not positive definite.
     pub shifts: usize,
     /// Residual force at the end (mN).
     pub residual_mn: f64,
+}
+
+impl AddAssign for NewtonReport {
+    /// The cost of two solves, one after the other.
+    fn add_assign(&mut self, next: Self) {
+        self.iterations += next.iterations;
+        self.halvings += next.halvings;
+        self.shifts += next.shifts;
+        self.residual_mn = next.residual_mn;
+    }
 }
 
 /// Why a solve gave no answer.
@@ -145,10 +146,10 @@ pub struct System<'a> {
 
 /// Memory of the solver, reused between solves of one pattern.
 pub struct Workspace {
-    factor: Factor,
-    values: Vec<f64>,
+    pub(super) factor: Factor,
+    pub(super) values: Vec<f64>,
     residual: Vec<f64>,
-    scratch: Scratch,
+    pub(super) scratch: Scratch,
 }
 
 impl Workspace {
@@ -163,36 +164,8 @@ impl Workspace {
     }
 }
 
-/// What one solve carries from step to step.
-struct Trial {
-    /// Positions at the beginning of the solve.
-    start: Vec<f64>,
-    /// Π at the last accepted positions; used by the line search alone.
-    potential: f64,
-    /// The last step in the layout of positions.
-    moved: Vec<f64>,
-    /// Predicted stresses.
-    predicted: Predicted,
-}
-
-/// Factor by which the diagonal shift grows until the factorisation succeeds.
-const SHIFT_GROWTH: f64 = 10.0;
-/// First diagonal shift, relative to the largest diagonal entry.
-const FIRST_SHIFT: f64 = 1e-4;
-/// Shifts tried before giving up.
-const MAX_SHIFTS: usize = 8;
-/// Residual over force scale above which predicted stresses are not yet used.
-const STRESS_STIFFNESS_BELOW: f64 = 0.1;
-/// Halvings tried in one line search.
-const MAX_HALVINGS: usize = 30;
-/// Share of the predicted decrease that a step must achieve (Armijo).
-const SUFFICIENT_DECREASE: f64 = 1e-4;
-/// Relative rounding error of the total energy, below which a decrease cannot be seen: the total is a small difference of the elements'
-/// energies and the work of the force.
-const ENERGY_ROUNDOFF: f64 = 1e-11;
-
 impl System<'_> {
-    fn potential(&self, positions: &[f64], start: &[f64], drive: Drive, scratch: &mut Scratch) -> f64 {
+    pub(super) fn potential(&self, positions: &[f64], start: &[f64], drive: Drive, scratch: &mut Scratch) -> f64 {
         let mut total = energy(self.terms, positions, scratch);
         if let (Drive::Force { direction, force_mn }, Some(vertex)) = (drive, self.driven) {
             let travel: f64 = (0..3).map(|k| (positions[3 * vertex + k] - start[3 * vertex + k]) * direction[k]).sum();
@@ -210,7 +183,7 @@ impl System<'_> {
 
     /// Fills `workspace.residual` with the out-of-balance forces: free unknowns, then the raw force on the driven vertex. Returns the norm
     /// over what must vanish.
-    fn residual(&self, positions: &[f64], drive: Drive, workspace: &mut Workspace) -> f64 {
+    pub(super) fn residual(&self, positions: &[f64], drive: Drive, workspace: &mut Workspace) -> f64 {
         gradient(self.terms, positions, self.dofs, &mut workspace.scratch, &mut workspace.residual);
         let free = self.dofs.free;
         for (r, load) in workspace.residual.iter_mut().zip(self.dead_load) {
@@ -237,20 +210,8 @@ impl System<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<NewtonReport, NewtonError> {
-        let start = positions.to_vec();
         let mut report = NewtonReport::default();
-        let mut trial = Trial {
-            potential: match settings.globalization {
-                Globalization::PredictedStress => 0.0,
-                Globalization::LineSearch => self.potential(positions, &start, drive, &mut workspace.scratch),
-            },
-            start,
-            moved: vec![0.0; positions.len()],
-            predicted: match settings.globalization {
-                Globalization::PredictedStress => Predicted::zero(self.terms),
-                Globalization::LineSearch => Predicted::default(),
-            },
-        };
+        let mut trial = Trial::new(self, positions, drive, settings, workspace);
         report.residual_mn = self.residual(positions, drive, workspace);
         if !report.residual_mn.is_finite() {
             return Err(self.bad_start(positions, &mut workspace.scratch));
@@ -266,105 +227,19 @@ impl System<'_> {
             if progress.interrupted() {
                 return Err(NewtonError::Interrupted { iterations: report.iterations });
             }
-            let Workspace { scratch, values, .. } = workspace;
-            hessian(self.terms, positions, &trial.predicted, self.pattern, scratch, values);
-            report.shifts += self.factorize(workspace)?;
+            let weakened = self.factorize_definite(positions, &mut trial, workspace)?;
+            report.shifts += weakened;
             let limit = if report.iterations < settings.held_iterations { 0.0 } else { settings.max_travel_mm };
             let (step, slope) = self.step(drive, limit, workspace)?;
             report.iterations += 1;
-            let taken = match settings.globalization {
-                Globalization::PredictedStress => {
-                    self.full_step(positions, &step, &mut trial, drive, settings.force_scale_mn, workspace)
-                }
-                Globalization::LineSearch => self.line_search(positions, &step, slope, &mut trial, drive, workspace),
-            };
+            let step = Step { step, slope, number: report.iterations, weakened: weakened > 0 };
+            let taken = self.advance(positions, &step, &mut trial, workspace);
             let stuck = NewtonError::NoStep { iterations: report.iterations, residual_mn: report.residual_mn };
             let (halvings, residual_mn) = taken.ok_or(stuck)?;
             report.halvings += halvings;
             report.residual_mn = residual_mn;
         }
         Ok(report)
-    }
-
-    /// Takes the whole step, or the first of its halves that inverts nothing; returns the number of halvings and the
-    /// residual.
-    fn full_step(
-        &self,
-        positions: &mut [f64],
-        step: &[f64],
-        trial: &mut Trial,
-        drive: Drive,
-        force_scale_mn: f64,
-        workspace: &mut Workspace,
-    ) -> Option<(usize, f64)> {
-        let before = positions.to_vec();
-        for halvings in 0..MAX_HALVINGS {
-            let scale = 0.5_f64.powi(halvings as i32);
-            positions.copy_from_slice(&before);
-            self.dofs.advance(positions, step, scale);
-            let residual_mn = self.residual(positions, drive, workspace);
-            if residual_mn.is_finite() {
-                if residual_mn > STRESS_STIFFNESS_BELOW * force_scale_mn {
-                    trial.predicted.clear();
-                    return Some((halvings, residual_mn));
-                }
-                trial.moved.fill(0.0);
-                self.dofs.advance(&mut trial.moved, step, scale);
-                predict_stress(self.terms, &before, &trial.moved, &mut workspace.scratch, &mut trial.predicted);
-                return Some((halvings, residual_mn));
-            }
-        }
-        None
-    }
-
-    /// Takes the largest halving of the step that decreases Π enough; returns the number of halvings and the
-    /// residual.
-    fn line_search(
-        &self,
-        positions: &mut [f64],
-        step: &[f64],
-        slope: f64,
-        trial: &mut Trial,
-        drive: Drive,
-        workspace: &mut Workspace,
-    ) -> Option<(usize, f64)> {
-        let before = positions.to_vec();
-        trial.moved.fill(0.0);
-        self.dofs.advance(&mut trial.moved, step, 1.0);
-        let longest = max_step(self.terms, &before, &trial.moved, &mut workspace.scratch);
-        let noise = ENERGY_ROUNDOFF * trial.potential.abs();
-        for halvings in 0..MAX_HALVINGS {
-            let scale = longest * 0.5_f64.powi(halvings as i32);
-            positions.copy_from_slice(&before);
-            self.dofs.advance(positions, step, scale);
-            let potential = self.potential(positions, &trial.start, drive, &mut workspace.scratch);
-            if potential <= trial.potential + SUFFICIENT_DECREASE * scale * slope + noise {
-                trial.potential = potential;
-                return Some((halvings, self.residual(positions, drive, workspace)));
-            }
-        }
-        None
-    }
-
-    /// Factorises the free part, raising its diagonal where it must; returns how often.
-    fn factorize(&self, workspace: &mut Workspace) -> Result<usize, NewtonError> {
-        let diagonal = || self.pattern.column_starts[..self.dofs.free].iter().map(|&at| at as usize);
-        let mut shift = 0.0;
-        for attempt in 0..=MAX_SHIFTS {
-            match workspace.factor.factorize(self.symbolic, self.pattern, &workspace.values) {
-                Ok(()) => return Ok(attempt),
-                Err(LinearSolveError::Indefinite) => {
-                    let largest = diagonal().map(|at| workspace.values[at]).fold(0.0, f64::max);
-                    let wanted = if shift == 0.0 { FIRST_SHIFT * largest } else { SHIFT_GROWTH * shift };
-                    for at in diagonal() {
-                        workspace.values[at] += wanted - shift;
-                    }
-                    shift = wanted;
-                }
-                Err(other) => return Err(other.into()),
-            }
-        }
-        Err(LinearSolveError::Indefinite.into())
     }
 
     /// The Newton step (free unknowns, then the border), the travel limited, and the slope of the potential along it.

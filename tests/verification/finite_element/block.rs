@@ -358,7 +358,7 @@ impl<'a> Body<'a> {
             Law::Linear => Box::new(Elasticity { geometry, materials }),
             Law::NeoHookean(law) => Box::new(FiniteStrain { geometry, materials, law }),
         };
-        use_terms(&[Term { effect: effect.as_ref(), stencils: &self.mesh.elements }])
+        use_terms(&[Term { effect: effect.as_ref(), stencils: &self.mesh.elements, set: 0 }])
     }
 
     /// Equilibrium under nodal forces from `positions`, in which the fixed components have their final values, to a residual of `tolerance`

@@ -1,7 +1,7 @@
 //! A needle on one bonded layer: Hertz and Dimitriadis at small strain, tables of another code's neo-Hookean slab.
 
 use nalgebra::{Isometry3, Vector3};
-use retina_core::equilibrium::{ContactSettings, Equilibrium, MeshSize, Motion, Solid, Tool, Wall};
+use retina_core::equilibrium::{ContactSettings, Equilibrium, Load, MeshSize, Motion, Solid, Tool, Wall};
 use retina_core::mesh::disc::DiscGeometry;
 use retina_core::mesh::sample::locate;
 use retina_core::mesh::wall::{WallDivision, WallTopology};
@@ -48,7 +48,7 @@ impl Press {
             disc: DiscGeometry { center: [0.0; 2], radii: radii.to_vec() },
             shape: NeedleShape::hemispherical(radius_mm),
             solid,
-            contact: ContactSettings { stiffness_kpa_per_mm: 1e6, smoothing_mm, points_per_edge: 3 },
+            contact: ContactSettings { stiffness_kpa_per_mm: 1e6, smoothing_mm, points_per_edge: 3, softening: 1.0 },
         }
     }
 
@@ -64,7 +64,9 @@ impl Press {
         wall.place_tip(&mut positions, &Vector3::new(0.0, 0.0, -motions[0].1));
         for (index, &(force_mn, travel_mm)) in motions.iter().enumerate() {
             let motion = Motion { direction: -Vector3::z_axis(), force_mn, travel_mm };
-            let answer = wall.solve(&motion, 0.0, positions, &mut workspace, &mut Silent).expect("an equilibrium");
+            let answer = wall
+                .solve(&Load { motion: &motion, touch_mm: 0.0, additions: &[] }, positions, &mut workspace, &mut Silent)
+                .expect("an equilibrium");
             see(&wall, &answer, index);
             positions = answer.positions;
         }
