@@ -14,6 +14,6 @@ export default defineConfig({
   use: {
     viewport: { width: 1280, height: 720 },
     launchOptions: browser,
-    trace: "retain-on-failure",
+    screenshot: "only-on-failure",
   },
 });

@@ -7,6 +7,7 @@ import type { Comparison, Session } from "./model/session";
 import type { Settings } from "./model/settings";
 import type { PredictRequest, PredictResponse, Surface, Vector } from "./model/wire";
 import type { Page } from "./page";
+import type { Paint } from "./paint";
 
 export interface Inspect {
   readonly settings: Settings;
@@ -19,7 +20,7 @@ export interface Inspect {
   readonly comparison: Comparison | undefined;
   /** Error of each node on screen, µm, where this pose was compared. */
   readonly errorsUm: number[] | undefined;
-  /** Whether the answer on screen is that of the newest settings. */
+  /** Whether the newest settings were answered and the answer is drawn. */
   readonly settled: boolean;
   /** Answers taken and frames drawn so far. */
   readonly updates: number;
@@ -36,7 +37,7 @@ declare global {
   }
 }
 
-export function inspect({ settings, session, stage, live }: Page): void {
+export function inspect({ settings, session, stage, live }: Page, paint: Paint): void {
   window.retina = {
     get settings() {
       return settings.get();
@@ -63,7 +64,8 @@ export function inspect({ settings, session, stage, live }: Page): void {
       return errorsOnScreen(session.get());
     },
     get settled() {
-      return live.loop.idle && session.get().shown !== undefined;
+      const { shown } = session.get();
+      return live.loop.idle && shown !== undefined && paint.drawn === shown;
     },
     get updates() {
       return session.get().updates;

@@ -50,7 +50,7 @@ function start(): void {
   effectsPanel(page);
   keyboard(page, keepPanel(page, paint));
   pointer(page);
-  inspect(page);
+  inspect(page, paint);
 
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const ink = (): void => stage.setInk(new Color(dark.matches ? 0xe8eef2 : 0x17242c));

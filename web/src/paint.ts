@@ -4,11 +4,12 @@ import { gradient } from "./colour/maps";
 import { figures, LABELS, scaleFor, type Scale } from "./colour/scale";
 import { errorsOnScreen } from "./compare";
 import { meanCurvature, surfaceStrain } from "./model/fields";
-import type { Session } from "./model/session";
+import type { Session, Shown } from "./model/session";
 import type { Quantity } from "./model/settings";
 import { needleShape } from "./model/tool";
 import type { Page } from "./page";
 import { byId, element, setText } from "./panels/dom";
+import { perFrame } from "./per_frame";
 
 /** One number for each node, in the unit of its label; `undefined` where it is not known. */
 function values(session: Session, quantity: Quantity): number[] | undefined {
@@ -28,6 +29,8 @@ function values(session: Session, quantity: Quantity): number[] | undefined {
 }
 
 export class Paint {
+  /** The answer that stands on the stage. */
+  drawn: Shown | undefined;
   private quantity: Quantity = "displacement";
   private scale: Scale = { min: 0, max: 1 };
   private readonly title = element("span", { class: "title" });
@@ -38,14 +41,15 @@ export class Paint {
   constructor(private readonly page: Page) {
     const ends = element("div", { class: "ends" }, ...this.ends);
     byId("legend").append(this.title, this.bar, ends, this.note);
+    const draw = perFrame(() => this.draw());
     page.session.follow((now, before) => {
       const changed = now.shown !== before.shown || now.comparison !== before.comparison;
-      if (changed || now.comparing !== before.comparing) this.draw();
+      if (changed || now.comparing !== before.comparing) draw();
     });
     page.settings.follow(({ quantity, layers }, before) => {
-      if (quantity !== before.quantity || layers !== before.layers) this.draw();
+      if (quantity !== before.quantity || layers !== before.layers) draw();
     });
-    this.draw();
+    draw();
   }
 
   current(): { quantity: Quantity; scale: Scale } {
@@ -61,6 +65,7 @@ export class Paint {
       const shape = needleShape(shown.settings, catalog.gauges);
       stage.show(shown.request, shown.answer, shown.rest, shape, layers);
     }
+    this.drawn = shown;
     const painted = values(now, quantity);
     const before = quantity === this.quantity ? this.scale : undefined;
     this.quantity = quantity;

@@ -54,7 +54,9 @@ export function pointer({ settings, session, stage }: Page): void {
     if (event.pointerId === drag?.id) drag = undefined;
   };
   canvas.addEventListener("pointerdown", begin, { capture: true });
-  canvas.addEventListener("pointermove", move, { capture: true });
+  // Where the browser tells of the hand more often than it draws, the answer may follow more often too.
+  const moves = "onpointerrawupdate" in canvas ? "pointerrawupdate" : "pointermove";
+  canvas.addEventListener(moves as "pointermove", move, { capture: true });
   canvas.addEventListener("pointerup", end);
   canvas.addEventListener("pointercancel", end);
 }

@@ -4,6 +4,7 @@ import { figures } from "./colour/scale";
 import type { Session } from "./model/session";
 import type { Page } from "./page";
 import { byId, element, setText } from "./panels/dom";
+import { perFrame } from "./per_frame";
 
 /** How often what changes is spoken to those who cannot see it. */
 const SPOKEN_EVERY_MS = 1500;
@@ -26,7 +27,11 @@ export function readout({ session, stage, settings, complaints }: Page): () => v
     connection.className = now.connection;
     if (now.problem !== before.problem) complaints.tell(now.problem);
     tellWhatIsWrong(banner, now);
-    if (now.shown && now.shown !== before.shown) setText(deepest, depth(now));
+  });
+
+  const depths = perFrame(() => setText(deepest, depth(session.get())));
+  session.follow(({ shown }, before) => {
+    if (shown !== before.shown) depths();
   });
 
   setInterval(() => {

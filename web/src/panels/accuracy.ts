@@ -9,6 +9,7 @@ import type { Page } from "../page";
 import { Choice } from "./choice";
 import { button, element, panel, setText } from "./dom";
 import { comparisonTable } from "./comparison_table";
+import { perFrame } from "../per_frame";
 import { NumberControl } from "./number_control";
 
 type Kind = "level" | "max_error_um" | "max_time_ms";
@@ -67,6 +68,7 @@ export function accuracyPanel({ settings, session, compare, complaints }: Page):
     error.root.hidden = now !== "max_error_um";
     time.root.hidden = now !== "max_time_ms";
   };
+  const tell = perFrame(() => showFacts(facts, session.get()));
   session.follow((now, before) => {
     const { catalog } = now;
     if (catalog && (catalog !== before.catalog || level.root.querySelector("input") === null)) {
@@ -91,7 +93,7 @@ export function accuracyPanel({ settings, session, compare, complaints }: Page):
       );
       show();
     }
-    showFacts(facts, now);
+    tell();
     start.disabled = now.comparing || now.shown === undefined || now.connection !== "connected";
     setText(start, now.comparing ? "Computing reference …" : "Compare with reference");
     if (

@@ -5,6 +5,7 @@ import type { EffectAnswer } from "../model/wire";
 import type { Page } from "../page";
 import type { Complainer } from "./complaints";
 import { checkbox, element, panel, setText } from "./dom";
+import { perFrame } from "../per_frame";
 
 interface Row {
   root: HTMLElement;
@@ -38,7 +39,7 @@ export function effectsPanel({ settings, session, complaints }: Page): void {
     settings.patch({ effects: on ? [...others, name] : others });
   };
   const rows = new Map<string, Row>();
-  const show = (): void => {
+  const show = perFrame(() => {
     const { effects: wanted } = settings.get();
     automatic.set(wanted === "auto");
     const answer = session.get().shown?.answer;
@@ -52,7 +53,7 @@ export function effectsPanel({ settings, session, complaints }: Page): void {
       row.tell(effect, wanted === "auto" ? effect.simulated : wanted.includes(effect.name));
     }
     setText(warnings, answer?.warnings.join(" ") ?? "");
-  };
+  });
   settings.follow(show);
   session.follow(({ shown }, before) => {
     if (shown !== before.shown) show();

@@ -5,11 +5,12 @@ import type { Settings } from "../model/settings";
 import type { Page } from "../page";
 import { Choice } from "./choice";
 import { button, element, panel } from "./dom";
+import { perFrame } from "../per_frame";
 import { NumberControl, type NumberOptions } from "./number_control";
 
-type Number = "forceMn" | "xMm" | "yMm" | "tiltDeg" | "leanDeg" | "rollDeg";
+type NumberKey = "forceMn" | "xMm" | "yMm" | "tiltDeg" | "leanDeg" | "rollDeg";
 
-const NUMBERS: readonly (Omit<NumberOptions, "change"> & { key: Number; fields: string[] })[] = [
+const NUMBERS: readonly (Omit<NumberOptions, "change"> & { key: NumberKey; fields: string[] })[] = [
   {
     key: "forceMn",
     label: "Force",
@@ -53,7 +54,7 @@ const NUMBERS: readonly (Omit<NumberOptions, "change"> & { key: Number; fields: 
 
 export function pressPanel({ settings, session, complaints }: Page): void {
   const body = panel("press");
-  const controls = new Map<Number, NumberControl>();
+  const controls = new Map<NumberKey, NumberControl>();
   for (const { key, fields, ...options } of NUMBERS) {
     const change = (value: number): void => settings.patch({ [key]: value });
     const control = new NumberControl({ ...options, change });
@@ -86,7 +87,7 @@ export function pressPanel({ settings, session, complaints }: Page): void {
   body.append(gauge.root, tip.root, shape, along.root);
 
   let offered: unknown;
-  const show = (): void => {
+  const show = perFrame(() => {
     const now = settings.get();
     const { catalog } = session.get();
     if (catalog && catalog !== offered) {
@@ -106,7 +107,7 @@ export function pressPanel({ settings, session, complaints }: Page): void {
     gauge.set(now.gauge);
     tip.set(now.tip);
     along.set(now.along);
-  };
+  });
   settings.follow(show);
   session.follow(({ catalog }, before) => {
     if (catalog !== before.catalog) show();
@@ -124,8 +125,8 @@ function lower(patch: (change: Partial<Settings>) => void, session: Page["sessio
     const limit = /at most ([\d.]+) mN/.exec(error?.allowed ?? "");
     back.hidden = !limit;
     if (!limit) return;
-    // A little less, for the printed number is rounded.
-    most = Math.floor(Number(limit[1]) * 990) / 1000;
+    // A little less: the printed number is rounded, and a tilted force also presses by what guides it.
+    most = +(0.98 * Number.parseFloat(limit[1] ?? "0")).toPrecision(2);
     back.textContent = `Set the force to ${most} mN`;
   });
   return back;
@@ -137,7 +138,7 @@ function tipNumbers(
   { settings, session, complaints }: Pick<Page, "settings" | "session" | "complaints">,
 ): void {
   const made = new Map<string, NumberControl>();
-  const show = (): void => {
+  const show = perFrame(() => {
     const { catalog } = session.get();
     const now = settings.get();
     const prefix = `needle.tip.${now.tip}.`;
@@ -171,7 +172,7 @@ function tipNumbers(
     if (controls.length !== place.childElementCount || controls[0] !== place.firstElementChild) {
       place.replaceChildren(...controls);
     }
-  };
+  });
   settings.follow(show);
   session.follow(({ catalog }, before) => {
     if (catalog !== before.catalog) show();

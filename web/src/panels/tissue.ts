@@ -5,6 +5,7 @@ import type { Parameter, SceneSpec } from "../model/wire";
 import type { Page } from "../page";
 import { Choice } from "./choice";
 import { button, checkbox, element, panel } from "./dom";
+import { perFrame } from "../per_frame";
 import { NumberControl } from "./number_control";
 
 const MEMBRANE = "scene.tissue.inner_limiting_membrane.";
@@ -32,7 +33,7 @@ export function tissuePanel(page: Page): void {
 
   const made = new Map<string, NumberControl>();
   let key = "";
-  const show = (): void => {
+  const show = perFrame(() => {
     const { catalog } = session.get();
     if (!catalog) return;
     const now = settings.get();
@@ -55,7 +56,7 @@ export function tissuePanel(page: Page): void {
     reset.disabled = Object.keys(now.parameters).length === 0;
     for (const { field, default: usual } of listed)
       made.get(field)?.set(value(now.parameters, spec, field, usual));
-  };
+  });
   settings.follow(show);
   session.follow(({ catalog }, before) => {
     if (catalog !== before.catalog) show();

@@ -3,7 +3,12 @@
 import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments } from "three";
 
 import type { Surface, Triangle } from "../model/wire";
-import { corners, CurvedTriangle, PIECES } from "./pn_triangle";
+import { bernstein, corners, CurvedTriangle, PIECES } from "./pn_triangle";
+
+/** At the ends of the pieces of an edge. */
+const WEIGHTS = Array.from({ length: PIECES + 1 }, (_, piece) =>
+  bernstein([1 - piece / PIECES, piece / PIECES, 0]),
+);
 
 /** Each edge once, by its two nodes. */
 function edgesOf(triangles: readonly Triangle[]): [number, number][] {
@@ -44,8 +49,7 @@ export class EdgeLines {
       const edge = new CurvedTriangle(points, corners(surface.normals, between), curved);
       for (let piece = 0; piece < PIECES; piece++) {
         for (const end of [0, 1]) {
-          const t = (piece + end) / PIECES;
-          edge.at([1 - t, t, 0], out, 6 * (e * PIECES + piece) + 3 * end);
+          edge.at(WEIGHTS[piece + end] ?? [], out, 6 * (e * PIECES + piece) + 3 * end);
         }
       }
     });

@@ -1,6 +1,6 @@
 /** The needle where it stands, glassy, so that the tissue under it is seen. */
 
-import { BackSide, FrontSide, Group, Mesh, MeshStandardMaterial, type BufferGeometry } from "three";
+import { BackSide, FrontSide, Group, Mesh, MeshPhongMaterial, type BufferGeometry } from "three";
 
 import type { Quaternion, Vector } from "../model/wire";
 import { needleGeometry, type NeedleShape } from "./needle_geometry";
@@ -8,11 +8,9 @@ import { needleGeometry, type NeedleShape } from "./needle_geometry";
 const LENGTH_MM = 1.7;
 
 /** Steel that is clear where it is looked at straight and dense at the rim, so that outline and tissue are both seen. */
-function glass(side: typeof FrontSide | typeof BackSide, opacity: number): MeshStandardMaterial {
-  const material = new MeshStandardMaterial({
+function glass(side: typeof FrontSide | typeof BackSide, opacity: number): MeshPhongMaterial {
+  const material = new MeshPhongMaterial({
     color: 0xb4c3d2,
-    roughness: 0.3,
-    metalness: 0.2,
     transparent: true,
     opacity,
     depthWrite: false,
@@ -31,8 +29,8 @@ function glass(side: typeof FrontSide | typeof BackSide, opacity: number): MeshS
 
 export class NeedleMesh {
   readonly group = new Group();
-  readonly front: Mesh<BufferGeometry, MeshStandardMaterial>;
-  private readonly back: Mesh<BufferGeometry, MeshStandardMaterial>;
+  readonly front: Mesh<BufferGeometry, MeshPhongMaterial>;
+  private readonly back: Mesh<BufferGeometry, MeshPhongMaterial>;
   private shapeKey = "";
 
   constructor() {

@@ -10,7 +10,7 @@ import {
   Matrix4,
   Mesh,
   MeshBasicMaterial,
-  MeshStandardMaterial,
+  MeshPhongMaterial,
   SphereGeometry,
 } from "three";
 
@@ -19,12 +19,13 @@ import type { Quantity } from "../model/settings";
 import type { Surface, Triangle } from "../model/wire";
 import { colourMap } from "./colour_map";
 import { EdgeLines } from "./edge_lines";
-import { corners, CurvedTriangle, FACES, POINTS } from "./pn_triangle";
+import { bernstein, corners, CurvedTriangle, FACES, POINTS } from "./pn_triangle";
 
+const POINT_WEIGHTS = POINTS.map(bernstein);
 const NODE_RADIUS_MM = 0.0095;
 export class PatchMesh {
   readonly group = new Group();
-  readonly surface: Mesh<BufferGeometry, MeshStandardMaterial>;
+  readonly surface: Mesh<BufferGeometry, MeshPhongMaterial>;
   readonly edges: EdgeLines;
   readonly nodes: InstancedMesh<SphereGeometry, MeshBasicMaterial>;
   private readonly triangles: readonly Triangle[];
@@ -46,7 +47,7 @@ export class PatchMesh {
         FACES.flatMap((face) => face.map((p) => t * POINTS.length + p)),
       ),
     );
-    const material = new MeshStandardMaterial({ side: DoubleSide, roughness: 0.62, metalness: 0 });
+    const material = new MeshPhongMaterial({ side: DoubleSide });
     // The edges lie in the surface and must win against it.
     Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2 });
     this.surface = new Mesh(geometry, material);
@@ -73,7 +74,7 @@ export class PatchMesh {
       const shape = new CurvedTriangle(corners(surface.vertices_mm, triangle), n, curved);
       POINTS.forEach((weights, p) => {
         const offset = 3 * (t * POINTS.length + p);
-        shape.at(weights, points, offset);
+        shape.at(POINT_WEIGHTS[p] ?? [], points, offset);
         const [u, v, w] = weights;
         for (let axis = 0; axis < 3; axis++) {
           normals[offset + axis] =

@@ -34,6 +34,22 @@ export const FACES: readonly [number, number, number][] = Array.from(
   },
 ).flat();
 
+/** What each control point counts for at a place in the triangle. */
+export function bernstein([u, v, w]: Weights): readonly number[] {
+  return [
+    u * u * u,
+    v * v * v,
+    w * w * w,
+    3 * u * u * v,
+    3 * u * v * v,
+    3 * v * v * w,
+    3 * v * w * w,
+    3 * w * w * u,
+    3 * w * u * u,
+    6 * u * v * w,
+  ];
+}
+
 export type Corners = readonly [Vector, Vector, Vector];
 
 const ORIGIN: Vector = [0, 0, 0];
@@ -69,23 +85,11 @@ export class CurvedTriangle {
     this.points = [...p, ...edges, middle];
   }
 
-  /** Writes the point at these weights to `out` from `offset`. */
-  at([u, v, w]: Weights, out: Float32Array, offset: number): void {
-    const bernstein = [
-      u * u * u,
-      v * v * v,
-      w * w * w,
-      3 * u * u * v,
-      3 * u * v * v,
-      3 * v * v * w,
-      3 * v * w * w,
-      3 * w * w * u,
-      3 * w * u * u,
-      6 * u * v * w,
-    ];
+  /** Writes the point with these [`bernstein`] weights to `out` from `offset`. */
+  at(weights: readonly number[], out: Float32Array, offset: number): void {
     for (let axis = 0; axis < 3; axis++) {
       let sum = 0;
-      for (let k = 0; k < 10; k++) sum += (bernstein[k] ?? 0) * (this.points[k]?.[axis] ?? 0);
+      for (let k = 0; k < 10; k++) sum += (weights[k] ?? 0) * (this.points[k]?.[axis] ?? 0);
       out[offset + axis] = sum;
     }
   }

@@ -23,6 +23,9 @@ interface Patch {
   normals: NormalArrows;
   /** Of the rest surface only the edges: a second sheet would hide the dent. */
   rest: EdgeLines;
+  /** What it was last shaped to. */
+  restShown: Surface | undefined;
+  curved: boolean;
 }
 
 export class Stage {
@@ -55,8 +58,11 @@ export class Stage {
   ): void {
     const patch = this.patchFor(answer.surface);
     patch.mesh.shape(answer.surface, layers.curved);
-    patch.rest.shape(rest, layers.curved);
-    patch.normals.place(answer.surface);
+    if (patch.restShown !== rest || patch.curved !== layers.curved) {
+      patch.rest.shape(rest, layers.curved);
+      Object.assign(patch, { restShown: rest, curved: layers.curved });
+    }
+    if (layers.normals) patch.normals.place(answer.surface);
     this.needle.shape(shape);
     this.needle.place(answer.needle.tip_mm, request.needle.orientation_xyzw ?? [0, 0, 0, 1]);
     this.force.place(answer.needle.tip_mm, request.force_mn ?? [0, 0, 0]);
@@ -101,7 +107,7 @@ export class Stage {
     const rest = new EdgeLines(surface, 0.8);
     rest.lines.material.color = new Color(REST_COLOUR);
     rest.lines.position.z = -SUNK_MM;
-    this.patch = { topology, mesh, normals, rest };
+    this.patch = { topology, mesh, normals, rest, restShown: undefined, curved: true };
     this.dress(this.patch);
     this.view.scene.add(mesh.group, normals.group, rest.lines);
     return this.patch;

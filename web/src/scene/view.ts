@@ -13,6 +13,8 @@ import {
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
+import { Resolution } from "./resolution";
+
 const TARGET = new Vector3(0, 0, 0.1);
 const HOME = new Vector3(0.75, -2.5, 1.75);
 /** Half of the width and height, in mm at the target, that must stay in view. */
@@ -27,6 +29,7 @@ export class View {
   readonly controls: OrbitControls;
   /** Frames drawn so far. */
   frames = 0;
+  private readonly resolution = new Resolution(() => this.draw());
   private pending = false;
   private moved = false;
   private readonly raycaster = new Raycaster();
@@ -89,17 +92,15 @@ export class View {
   requestFrame(): void {
     if (this.pending) return;
     this.pending = true;
-    requestAnimationFrame(() => {
+    requestAnimationFrame((now) => {
       this.pending = false;
-      this.draw();
+      this.render(this.resolution.next(now));
     });
   }
 
-  /** Draws at once: what a picture of the canvas needs right before it is taken. */
+  /** Draws at once and finely: what a picture of the canvas needs right before it is taken. */
   draw(): void {
-    this.renderer.render(this.scene, this.camera);
-    this.frames++;
-    this.afterFrame();
+    this.render(1);
   }
 
   /** Where a ray through a point of the window first meets one of the objects. */
@@ -118,10 +119,17 @@ export class View {
     return { x: ((x + 1) / 2) * box.clientWidth, y: ((1 - y) / 2) * box.clientHeight };
   }
 
+  private render(share: number): void {
+    const ratio = share * Math.min(2, devicePixelRatio);
+    if (ratio !== this.renderer.getPixelRatio()) this.renderer.setPixelRatio(ratio);
+    this.renderer.render(this.scene, this.camera);
+    this.frames++;
+    this.afterFrame();
+  }
+
   private resize(): void {
     const stage = this.renderer.domElement.parentElement;
     if (!stage || stage.clientWidth === 0 || stage.clientHeight === 0) return;
-    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
     this.renderer.setSize(stage.clientWidth, stage.clientHeight);
     this.camera.aspect = stage.clientWidth / stage.clientHeight;
     this.camera.updateProjectionMatrix();
