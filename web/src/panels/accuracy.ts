@@ -31,7 +31,7 @@ export function accuracyPanel({ settings, session, compare, complaints }: Page):
   const kind = new Choice<Kind>("Ask for", [], (kind) => choose(last[kind]));
   const level = new Choice("Level", [], (level) => choose({ level }));
   const error = new NumberControl({
-    label: "Largest error",
+    label: "At most",
     unit: "µm",
     min: 0.2,
     max: 50,
@@ -39,7 +39,7 @@ export function accuracyPanel({ settings, session, compare, complaints }: Page):
     change: (value) => choose({ max_error_um: value }),
   });
   const time = new NumberControl({
-    label: "Longest time",
+    label: "Within",
     unit: "ms",
     min: 0.05,
     max: 5000,
@@ -79,9 +79,9 @@ export function accuracyPanel({ settings, session, compare, complaints }: Page):
       const kinds: Kind[] = ["level", "max_error_um", "max_time_ms"];
       note.hidden = kinds.every((field) => catalog.accuracyFields.includes(field));
       kind.offer([
-        offered("level", "a level"),
-        offered("max_error_um", "a tolerance"),
-        offered("max_time_ms", "a deadline"),
+        offered("level", "level"),
+        offered("max_error_um", "tolerance"),
+        offered("max_time_ms", "deadline"),
       ]);
       const hint = (what: string, cost: string): string => `${what}: ${cost}`;
       level.offer(

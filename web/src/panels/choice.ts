@@ -22,13 +22,8 @@ export class Choice<T extends string> implements Complainer {
     private readonly change: (value: T) => void,
   ) {
     this.row = element("div", { class: "options" });
-    this.root = element(
-      "fieldset",
-      { class: "choice" },
-      element("legend", {}, label),
-      this.row,
-      this.complaint,
-    );
+    const group = { class: "choice", role: "radiogroup", "aria-label": label };
+    this.root = element("div", group, element("span", {}, label), this.row, this.complaint);
     this.offer(options);
   }
 

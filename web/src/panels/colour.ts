@@ -25,7 +25,7 @@ export function colourPanel({ settings }: Page): void {
       hint: `${note} (${unit})`,
     };
   });
-  const quantity = new Choice("Colour shows", options, (quantity) => settings.patch({ quantity }));
+  const quantity = new Choice("Colour", options, (quantity) => settings.patch({ quantity }));
   const boxes = LAYERS.map((layer) => {
     const box = checkbox(LAYER_NAMES[layer], (on) =>
       settings.patch({ layers: { ...settings.get().layers, [layer]: on } }),

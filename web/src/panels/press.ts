@@ -76,10 +76,10 @@ export function pressPanel({ settings, session, complaints }: Page): void {
   );
   complaints.register(tip, "needle.tip");
   const along = new Choice<Settings["along"]>(
-    "Force acts along",
+    "Force along",
     [
       { value: "needle", text: "the shaft" },
-      { value: "inward", text: "−z, into the tissue" },
+      { value: "inward", text: "−z, straight in" },
     ],
     (along) => settings.patch({ along }),
   );
