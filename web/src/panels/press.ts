@@ -61,7 +61,7 @@ export function pressPanel({ settings, session, complaints }: Page): void {
     complaints.register(control, ...fields);
     controls.set(key, control);
     body.append(control.root);
-    if (key === "forceMn") body.append(lower(settings.patch.bind(settings), session));
+    if (key === "forceMn") body.append(lower({ settings, session }));
   }
   const gauge = new Choice("Gauge", [], (gauge) => settings.patch({ gauge }));
   complaints.register(gauge, "needle.gauge", "needle.radius_mm");
@@ -116,17 +116,19 @@ export function pressPanel({ settings, session, complaints }: Page): void {
 }
 
 /** A way back when the needle would puncture: the server says how much it takes. */
-function lower(patch: (change: Partial<Settings>) => void, session: Page["session"]): HTMLElement {
+function lower({ settings, session }: Pick<Page, "settings" | "session">): HTMLElement {
   let most = 0;
-  const back = button("", () => patch({ forceMn: most }));
+  const back = button("", () => settings.patch({ forceMn: most }));
   back.hidden = true;
   session.follow(({ problem }) => {
     const error = problem?.errors?.find(({ field }) => field === "force_mn");
     const limit = /at most ([\d.]+) mN/.exec(error?.allowed ?? "");
     back.hidden = !limit;
     if (!limit) return;
-    // A little less: the printed number is rounded, and a tilted force also presses by what guides it.
-    most = +(0.98 * Number.parseFloat(limit[1] ?? "0")).toPrecision(2);
+    // What counts is the part of the force into the tissue, which the server names: in that ratio, and a little less for rounding.
+    const { forceMn } = settings.get();
+    const named = typeof error?.value === "number" && error.value > 0 ? error.value : forceMn;
+    most = +(0.99 * Number.parseFloat(limit[1] ?? "0") * (forceMn / named)).toPrecision(2);
     back.textContent = `Set the force to ${most} mN`;
   });
   return back;

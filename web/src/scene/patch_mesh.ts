@@ -52,7 +52,7 @@ export class PatchMesh {
     Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2 });
     this.surface = new Mesh(geometry, material);
     this.edges = new EdgeLines(like, 0.32);
-    const ball = new SphereGeometry(NODE_RADIUS_MM, 10, 8);
+    const ball = new SphereGeometry(NODE_RADIUS_MM, 8, 6);
     this.nodes = new InstancedMesh(
       ball,
       new MeshBasicMaterial({ color: 0x17242c }),
