@@ -31,7 +31,7 @@ fn main() -> io::Result<()> {
             for line in reason.lines() {
                 println!("cargo::warning=the page is not embedded: {line}");
             }
-            format!("Embedded::Missing({reason:?})")
+            format!("Embedded {{ files: &[], missing: Some({reason:?}) }}")
         }
     };
     fs::write(out.join("embedded.rs"), embedded)
@@ -78,13 +78,13 @@ fn built(page: &Path) -> io::Result<String> {
     let mut files = Vec::new();
     collect(page, page, &mut files)?;
     files.sort();
-    let mut text = String::from("Embedded::Built(&[\n");
+    let mut text = String::from("Embedded { missing: None, files: &[\n");
     for (name, path) in files {
         let path = path.canonicalize()?;
         // Writing to a string does not fail.
-        let _ = writeln!(text, "    File {{ name: {name:?}, bytes: include_bytes!({path:?}) }},");
+        let _ = writeln!(text, "    ({name:?}, include_bytes!({path:?})),");
     }
-    text.push_str("])\n");
+    text.push_str("] }\n");
     Ok(text)
 }
 

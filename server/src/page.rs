@@ -13,20 +13,12 @@ use axum::response::{Html, IntoResponse, Response};
 
 use crate::handlers::not_found;
 
-/// A file of the page.
-struct File {
-    name: &'static str,
-    bytes: &'static [u8],
-}
-
 /// What the build left.
-enum Embedded {
-    /// Every file of the page.
-    #[allow(dead_code, reason = "one of the two, as the build went")]
-    Built(&'static [File]),
-    /// Why there is no page.
-    #[allow(dead_code, reason = "one of the two, as the build went")]
-    Missing(&'static str),
+struct Embedded {
+    /// Every file of the page: its name and its bytes.
+    files: &'static [(&'static str, &'static [u8])],
+    /// Why there is none.
+    missing: Option<&'static str>,
 }
 
 static PAGE: Embedded = include!(concat!(env!("OUT_DIR"), "/embedded.rs"));
@@ -39,21 +31,16 @@ type Headers = [(HeaderName, &'static str); 4];
 
 /// Why the program has no page; `None` where it has one.
 pub fn missing() -> Option<&'static str> {
-    match PAGE {
-        Embedded::Built(_) => None,
-        Embedded::Missing(reason) => Some(reason),
-    }
+    PAGE.missing
 }
 
 /// `GET /`.
 pub async fn index(uri: Uri) -> Response {
-    match PAGE {
-        Embedded::Built(_) => file("index.html", "no-cache", uri).await,
-        Embedded::Missing(reason) => {
-            let page = include_str!("../assets/no_page.html").replace("{reason}", &escaped(reason));
-            (headers("text/html; charset=utf-8", "no-cache"), Html(page)).into_response()
-        }
-    }
+    let Some(reason) = PAGE.missing else {
+        return file("index.html", "no-cache", uri).await;
+    };
+    let page = include_str!("../assets/no_page.html").replace("{reason}", &escaped(reason));
+    (headers("text/html; charset=utf-8", "no-cache"), Html(page)).into_response()
 }
 
 /// `GET /assets/{name}`.
@@ -63,12 +50,8 @@ pub async fn asset(name: Result<Path<String>, PathRejection>, uri: Uri) -> Respo
 }
 
 async fn file(name: &str, cache: &'static str, uri: Uri) -> Response {
-    let files = match PAGE {
-        Embedded::Built(files) => files,
-        Embedded::Missing(_) => &[],
-    };
-    match files.iter().find(|file| file.name == name) {
-        Some(file) => (headers(media_type(name), cache), file.bytes).into_response(),
+    match PAGE.files.iter().find(|(known, _)| *known == name) {
+        Some((_, bytes)) => (headers(media_type(name), cache), *bytes).into_response(),
         None => not_found(uri).await.into_response(),
     }
 }
