@@ -31,7 +31,7 @@ test("everything by keys alone", async ({ retina }) => {
   }
   await settled(retina);
   const now = await retina.evaluate(() => window.retina.settings);
-  expect(now).toMatchObject({ xMm: 0.1, yMm: -0.03, tiltDeg: 18, leanDeg: 33, rollDeg: 3 });
+  expect(now).toMatchObject({ xMm: 0.1, yMm: -0.03, tiltDeg: 18, leanDeg: 93, rollDeg: 3 });
   expect(now.forceMn).toBeGreaterThan(0.8);
   expect(now.layers.normals).toBe(true);
   expect(now.quantity).toBe("curvature");

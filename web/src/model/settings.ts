@@ -48,7 +48,7 @@ export const INITIAL: Settings = {
   yMm: -0.05,
   forceMn: 0.8,
   tiltDeg: 15,
-  leanDeg: 30,
+  leanDeg: 90,
   rollDeg: 0,
   along: "needle",
   accuracy: { level: "linear" },

@@ -76,10 +76,10 @@ export function pressPanel({ settings, session, complaints }: Page): void {
   );
   complaints.register(tip, "needle.tip");
   const along = new Choice<Settings["along"]>(
-    "Force along",
+    "Push",
     [
-      { value: "needle", text: "the shaft" },
-      { value: "inward", text: "−z, straight in" },
+      { value: "needle", text: "along the shaft" },
+      { value: "inward", text: "straight in, −z" },
     ],
     (along) => settings.patch({ along }),
   );
