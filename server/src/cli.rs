@@ -26,7 +26,7 @@ use crate::stopwatch::Stopwatch;
 use crate::understand;
 use crate::wire::PredictRequest;
 use crate::write::Layout;
-use crate::{App, run};
+use crate::{App, page, run};
 
 /// Where the program reads from and writes to.
 pub struct Streams<'a> {
@@ -70,7 +70,10 @@ fn serve(config: &Config) -> ExitCode {
 async fn serve_until_ctrl_c(config: &Config) -> io::Result<()> {
     let listener = tokio::net::TcpListener::bind(config.listen).await?;
     let address = listener.local_addr()?;
-    tracing::info!("listening on http://{address}, try http://{address}/docs");
+    tracing::info!("listening on http://{address}, the API is at http://{address}/docs");
+    if let Some(reason) = page::missing() {
+        tracing::warn!(reason, "no page at http://{address}/, which says how to get it; the API works without");
+    }
     let shutdown = CancellationToken::new();
     let stop = shutdown.clone();
     tokio::spawn(async move {

@@ -5,7 +5,7 @@ use axum::body::Body;
 use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, Method, Uri, header};
-use axum::response::{Html, IntoResponse, Response};
+use axum::response::{IntoResponse, Response};
 
 use crate::catalog;
 use crate::problem::{Kind, MEDIA_TYPE, Problem, ProblemDocument};
@@ -93,11 +93,6 @@ pub async fn problem(name: Result<Path<String>, PathRejection>) -> Result<String
         Problem::new(Kind::NotFound, format!("There is no such problem; known are {}.", known.join(", ")))
     })?;
     Ok(format!("{} ({})\n\n{}\n", kind.title(), kind.status(), kind.explanation()))
-}
-
-/// A page that links to what there is.
-pub async fn index() -> Html<&'static str> {
-    Html(include_str!("../assets/index.html"))
 }
 
 /// For a URL that there is not.

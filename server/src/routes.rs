@@ -15,6 +15,7 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
 use crate::handlers;
+use crate::page;
 use crate::state::AppState;
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
@@ -49,7 +50,8 @@ pub fn app(state: AppState) -> Router {
         })
         .on_failure(());
     routes
-        .route("/", get(handlers::index))
+        .route("/", get(page::index))
+        .route("/assets/{name}", get(page::asset))
         .route("/openapi.json", get(|| async { Json(api) }))
         .merge(SwaggerUi::new("/docs").config(docs))
         .fallback(handlers::not_found)

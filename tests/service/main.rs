@@ -8,6 +8,7 @@ mod answers;
 mod catalog;
 mod harness;
 mod load;
+mod page;
 mod program;
 mod properties;
 mod refusals;
