@@ -5,7 +5,10 @@
 //! threads.
 
 pub mod beds;
+pub mod budget;
+pub mod calibration;
 pub mod choice;
+pub mod expected_error;
 pub mod finite_element;
 pub mod linear;
 mod topologies;
@@ -25,7 +28,9 @@ use crate::progress::Progress;
 use crate::scene::{Scene, SceneSurface};
 use crate::solve::newton;
 use beds::Beds;
+use budget::{Budget, Choice, LevelTimes};
 use choice::{Decision, Expected, decide};
+use expected_error::{ExpectedError, Situation};
 use finite_element::{Bench, COARSE, ContactEstimate, FiniteElementAnswer, Problem, REFERENCE, Resolution};
 use linear::{LinearAnswer, Load, Press, press};
 use topologies::shared_topology;
@@ -108,23 +113,48 @@ impl PreparedScene {
         progress: &mut dyn Progress,
     ) -> Result<Prediction, PredictError> {
         progress.stage("linear");
-        request.needle.validate()?;
         let body = request.needle.shape.body();
-        let first = self.question(request, &body, &request.needle.tip_mm)?;
-        let question = match self.scene.surface {
+        self.aimed(request, &body)?.answer(resolution, workspace, progress)
+    }
+
+    /// The level that answers `request` (whose own level does not matter) within `budget`, where the levels take `times_ms`.
+    ///
+    /// # Errors
+    /// [`PredictError::Budget`] for a strict budget that no level keeps; what [`PreparedScene::predict`] would refuse.
+    pub fn choose(&self, request: &Request, budget: &Budget, times_ms: &LevelTimes) -> Result<Choice, PredictError> {
+        budget.choose(&self.situation(request)?, times_ms)
+    }
+
+    /// What is known of `request` before a level computes it.
+    ///
+    /// # Errors
+    /// What [`PreparedScene::predict`] would refuse.
+    pub fn situation(&self, request: &Request) -> Result<Situation, PredictError> {
+        let body = request.needle.shape.body();
+        let question = self.aimed(request, &body)?;
+        Ok(match question.begin()? {
+            Begun::Still(_) => question.situation(0.0, 0.0, None),
+            Begun::Pressed(linear) => question.pressed(&linear),
+        })
+    }
+
+    /// The request in the frame of the patch where the needle touches.
+    fn aimed<'a>(&'a self, request: &'a Request, body: &'a Body) -> Result<Question<'a>, PredictError> {
+        request.needle.validate()?;
+        let first = self.question(request, body, &request.needle.tip_mm)?;
+        match self.scene.surface {
             // The patch is the nodes nearest to the contact: cut again where the needle touches.
             SceneSurface::Mesh(_) => match press(first.patch(), &first.tool, &first.motion) {
                 Ok(press) => {
                     let [x, y] = press.touch.parameter;
                     let touch = first.patch().surface.column(x, y).surface;
                     let touch_in_scene = first.patch().scene_from_patch * touch;
-                    self.question(request, &body, &touch_in_scene)?
+                    self.question(request, body, &touch_in_scene)
                 }
-                Err(_) => first,
+                Err(_) => Ok(first),
             },
-            _ => first,
-        };
-        question.answer(resolution, workspace, progress)
+            _ => Ok(first),
+        }
     }
 
     /// The request in the frame of the patch around `contact`.
@@ -163,6 +193,14 @@ enum CutOrGrid<'a> {
     Cut(Box<Patch>),
 }
 
+/// What a request comes to before any level computes it.
+enum Begun<'a> {
+    /// Nothing moves, for this reason.
+    Still(&'static str),
+    /// The needle presses.
+    Pressed(LinearAnswer<'a>),
+}
+
 /// A request in the patch frame.
 struct Question<'a> {
     prepared: &'a PreparedScene,
@@ -186,27 +224,14 @@ impl Question<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<Prediction, PredictError> {
-        let still = Expected { depth_mm: 0.0, strain: 0.0 };
-        if self.motion.force_mn == Some(0.0) {
-            let decision = decide(&self.request.effects, self.request.level, still)?;
-            return Ok(self.at_rest(decision, "no force is applied"));
-        }
-        let press = press(self.patch(), &self.tool, &self.motion)?;
-        self.check_pressure(&press)?;
-        let closed = !matches!(press.load, Load::Depth(depth) if depth <= 0.0);
-        if !closed {
-            let decision = decide(&self.request.effects, self.request.level, still)?;
-            return Ok(self.at_rest(decision, "the needle does not reach the surface"));
-        }
-        let linear = LinearAnswer::new(
-            &self.prepared.beds,
-            self.patch(),
-            &self.tool,
-            self.request.needle.shape.tip,
-            press,
-            &self.motion.direction,
-        )?;
-        self.check_depth(&linear)?;
+        let linear = match self.begin()? {
+            Begun::Pressed(linear) => linear,
+            Begun::Still(why) => {
+                let still = Expected { depth_mm: 0.0, strain: 0.0 };
+                let decision = decide(&self.request.effects, self.request.level, still)?;
+                return Ok(self.at_rest(decision, why));
+            }
+        };
         let strain = linear.depth_mm / self.yielding_mm();
         let decision =
             decide(&self.request.effects, self.request.level, Expected { depth_mm: linear.depth_mm, strain })?;
@@ -218,7 +243,35 @@ impl Question<'_> {
             Level::Coarse => self.coarse(&linear, &decision, workspace, progress)?,
             Level::Reference => self.fine(resolution, &linear, &decision, workspace, progress)?,
         };
-        Ok(self.prediction(self.with_node_penetration(answer), decision))
+        let expected = self.pressed(&linear).expected_error(self.request.level);
+        Ok(self.prediction(self.with_node_penetration(answer), decision, expected))
+    }
+
+    /// The linear answer, or why nothing moves.
+    fn begin(&self) -> Result<Begun<'_>, PredictError> {
+        if self.motion.force_mn == Some(0.0) {
+            return Ok(Begun::Still("no force is applied"));
+        }
+        let press = press(self.patch(), &self.tool, &self.motion)?;
+        self.check_pressure(&press)?;
+        if matches!(press.load, Load::Depth(depth) if depth <= 0.0) {
+            return Ok(Begun::Still("the needle does not reach the surface"));
+        }
+        let beds = &self.prepared.beds;
+        let tip = self.request.needle.shape.tip;
+        let linear = LinearAnswer::new(beds, self.patch(), &self.tool, tip, press, &self.motion.direction)?;
+        self.check_depth(&linear)?;
+        Ok(Begun::Pressed(linear))
+    }
+
+    fn pressed(&self, linear: &LinearAnswer) -> Situation {
+        self.situation(linear.depth_mm, linear.depth_mm / self.yielding_mm(), Some(&linear.press))
+    }
+
+    fn situation(&self, depth_mm: f64, strain: f64, press: Option<&Press>) -> Situation {
+        let points = self.tool.patch_from_needle.rotation * -Vector3::z_axis();
+        let angle_deg = press.map_or(0.0, |press| points.dot(&press.touch.inward).clamp(-1.0, 1.0).acos().to_degrees());
+        Situation::new(&self.prepared.scene, &self.request.needle.shape, angle_deg, depth_mm, strain)
     }
 
     /// Adds to the reported penetration that of the patch's own nodes: a coarse face may cut a sharp edge between its quadrature points.
@@ -383,11 +436,13 @@ impl Question<'_> {
             solver: SolverReport::default(),
             estimate: ContactEstimate { center: [0.0; 2], radius_mm: 0.0, touch_mm: 0.0, travel_mm: 0.0 },
         };
-        self.prediction(answer, decision)
+        // Nothing moves, exactly.
+        let expected = ExpectedError { median_um: 0.0, p95_um: 0.0, calibrated: true };
+        self.prediction(answer, decision, expected)
     }
 
     /// The answer in scene coordinates.
-    fn prediction(&self, answer: FiniteElementAnswer, decision: Decision) -> Prediction {
+    fn prediction(&self, answer: FiniteElementAnswer, decision: Decision, expected: ExpectedError) -> Prediction {
         let patch = self.patch();
         let deformed: Vec<Point3<f64>> =
             patch.vertices.iter().zip(&answer.displacements).map(|(vertex, moved)| vertex + moved).collect();
@@ -419,6 +474,7 @@ impl Question<'_> {
             },
             contact: answer.contact,
             level: self.request.level,
+            expected_error: expected,
             effects: decision.reports,
             solver: answer.solver,
             warnings,

@@ -4,13 +4,14 @@ use retina_core::needle::shape::{BEVEL_ANGLE, EDGE_RADIUS, RADIUS};
 use retina_core::needle::{GAUGES, TIP_COORDINATE};
 use retina_core::patch::{NODES_PER_SIDE, SPACING_MM};
 use retina_core::predict::Level;
+use retina_core::predict::budget::DEFAULT_LEVEL;
 use retina_core::range::ParameterRange;
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
 use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA};
 use retina_core::tissue::{Layer, Tissue};
 
-use crate::understand::{DEFAULT_GAUGE, DEFAULT_LEVEL, DEFAULT_SCENE, FORCE};
+use crate::understand::{DEFAULT_GAUGE, DEFAULT_SCENE, FORCE, MAX_ERROR, MAX_TIME};
 use crate::wire::catalog::{
     GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
 };
@@ -103,6 +104,8 @@ fn tissue(tissue: &Tissue) -> TissueSpec {
 fn parameters() -> Vec<ParameterEntry> {
     let single = [
         ("force_mn", &FORCE),
+        ("accuracy.max_error_um", &MAX_ERROR),
+        ("accuracy.max_time_ms", &MAX_TIME),
         ("needle.tip_mm", &TIP_COORDINATE),
         ("needle.radius_mm", &RADIUS),
         ("needle.tip.flat.edge_radius_mm", &EDGE_RADIUS),

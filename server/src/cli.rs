@@ -18,11 +18,12 @@ use retina_core::surface::mesh_file::{MeshFormat, read_mesh};
 use tokio_util::sync::CancellationToken;
 use tracing_subscriber::EnvFilter;
 
-use crate::answer::predict;
+use crate::answer::{Question, predict};
 use crate::config::{Command, CommandLine, Config, LogForm, PredictArgs};
 use crate::problem::{Kind, Problem, from_predict};
 use crate::read::read;
 use crate::stopwatch::Stopwatch;
+use crate::times::Times;
 use crate::understand;
 use crate::wire::PredictRequest;
 use crate::write::Layout;
@@ -138,13 +139,15 @@ fn answer(body: &[u8], mesh: Option<&Path>, layout: Layout) -> Result<Vec<u8>, P
     let mut stopwatch = Stopwatch::start(Instant::now(), Duration::MAX / 4, &|| false);
     let message: PredictRequest = read(body)?;
     let request = understand::request(&message)?;
+    let budget = understand::budget(message.accuracy.as_ref())?;
     let mut scene = understand::chosen(message.scene.as_ref())?;
     if let Some(path) = mesh {
         replace_surface(&mut scene, path)?;
     }
     stopwatch.stage("prepare");
     let scene = PreparedScene::new(scene).map_err(from_predict)?;
-    predict(&scene, &request, &mut Workspace::default(), &mut stopwatch, layout)
+    let question = Question { request, budget, times: &Times::default() };
+    predict(&scene, question, &mut Workspace::default(), &mut stopwatch, layout)
 }
 
 fn replace_surface(scene: &mut Scene, path: &Path) -> Result<(), Problem> {

@@ -21,6 +21,7 @@ mod run;
 pub mod scenes;
 mod state;
 mod stopwatch;
+mod times;
 mod understand;
 pub mod wire;
 pub mod write;

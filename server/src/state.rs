@@ -9,17 +9,19 @@ use axum::http::HeaderMap;
 use nalgebra::{Point3, Vector3};
 use retina_core::needle::shape::RADIUS;
 use retina_core::needle::{Needle, NeedleShape};
+use retina_core::predict::budget::Budget;
 use retina_core::predict::{Control, EffectChoice, Level, Request, Workspace};
 use retina_core::scene::Scene;
 use tokio::sync::Semaphore;
 
-use crate::answer::{answer, predict};
+use crate::answer::{Question, answer, predict};
 use crate::body::{self, LARGE_AT_ONCE};
 use crate::config::Config;
 use crate::pool::{Pool, PoolError};
 use crate::problem::{Kind, Problem};
 use crate::scenes::Scenes;
 use crate::stopwatch::Stopwatch;
+use crate::times::Times;
 use crate::wire::request::SceneChoice;
 use crate::write::Layout;
 
@@ -38,6 +40,7 @@ pub struct App {
     pool: Pool,
     large_bodies: Arc<Semaphore>,
     warm_up: Arc<OnceLock<Result<(), Problem>>>,
+    times: Arc<Times>,
     time_limit: Duration,
 }
 
@@ -50,10 +53,11 @@ impl App {
         let scenes = Arc::new(Scenes::new(config.scene_cache_bytes()));
         let warm_up = Arc::new(OnceLock::new());
         let time_limit = config.time_limit();
+        let times = Arc::new(Times::default());
         let first = {
-            let (scenes, outcome) = (Arc::clone(&scenes), Arc::clone(&warm_up));
+            let (scenes, times, outcome) = (Arc::clone(&scenes), Arc::clone(&times), Arc::clone(&warm_up));
             move |workspace: &mut Workspace| {
-                let result = prepare_built_in(&scenes, workspace);
+                let result = prepare_built_in(&scenes, &times, workspace);
                 if let Err(problem) = &result {
                     tracing::error!(detail = %problem.detail, "the built-in scenes could not be prepared");
                 }
@@ -66,6 +70,7 @@ impl App {
             large_bodies: Arc::new(Semaphore::new(LARGE_AT_ONCE)),
             scenes,
             warm_up,
+            times,
             time_limit,
         }))
     }
@@ -77,10 +82,10 @@ impl App {
     pub async fn answer(&self, headers: &HeaderMap, body: Body) -> Result<Vec<u8>, Problem> {
         let body = body::json(headers, body, &self.large_bodies).await?;
         let accepted = Instant::now();
-        let (scenes, limit) = (Arc::clone(&self.scenes), self.time_limit);
+        let (scenes, times, limit) = (Arc::clone(&self.scenes), Arc::clone(&self.times), self.time_limit);
         let job = move |workspace: &mut Workspace, abandoned: &dyn Fn() -> bool| {
             let mut stopwatch = Stopwatch::start(accepted, limit, abandoned);
-            answer(body.as_ref(), &scenes, workspace, &mut stopwatch)
+            answer(body.as_ref(), &scenes, &times, workspace, &mut stopwatch)
         };
         self.pool.run(job).await.unwrap_or_else(|error| {
             Err(match error {
@@ -109,7 +114,7 @@ impl App {
 }
 
 /// A light touch on every built-in scene, so that what depends on the scene alone is there before the first request.
-fn prepare_built_in(scenes: &Scenes, workspace: &mut Workspace) -> Result<(), Problem> {
+fn prepare_built_in(scenes: &Scenes, times: &Times, workspace: &mut Workspace) -> Result<(), Problem> {
     let shape = NeedleShape::hemispherical(RADIUS.default);
     let needle = Needle::pointing(shape, Point3::origin(), &-Vector3::z_axis());
     for name in Scene::built_in_names() {
@@ -121,8 +126,9 @@ fn prepare_built_in(scenes: &Scenes, workspace: &mut Workspace) -> Result<(), Pr
                 level,
                 effects: EffectChoice::Auto,
             };
+            let budget = Budget { level: Some(level), ..Budget::default() };
             let mut stopwatch = Stopwatch::start(Instant::now(), WARM_UP_LIMIT, &|| false);
-            predict(&scene, &request, workspace, &mut stopwatch, Layout::Compact)?;
+            predict(&scene, Question { request, budget, times }, workspace, &mut stopwatch, Layout::Compact)?;
         }
     }
     Ok(())

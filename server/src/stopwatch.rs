@@ -22,6 +22,11 @@ impl<'a> Stopwatch<'a> {
         Self { stages: vec![("queue", now - accepted)], current: "read", since: now, deadline: now + limit, abandoned }
     }
 
+    /// Time since the request was accepted.
+    pub fn elapsed(&self) -> Duration {
+        self.stages.iter().map(|(_, time)| *time).sum::<Duration>() + self.since.elapsed()
+    }
+
     /// Ends the last stage; the stages so far with their times.
     pub fn finish(&mut self) -> &[(&'static str, Duration)] {
         self.lap();

@@ -5,6 +5,7 @@
 //! Not here: whether the physics is right, which the other tiers say.
 
 mod answers;
+mod budgets;
 mod catalog;
 mod harness;
 mod load;

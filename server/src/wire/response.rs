@@ -95,6 +95,21 @@ pub enum ContactWord {
 pub struct AccuracyAnswer {
     /// The level that answered.
     pub level: &'static str,
+    /// How far the worst node of the patch is likely to be from the truth.
+    pub expected_error_um: ExpectedErrorAnswer,
+    /// Whether that was measured on requests like this one (tissue, needle, pose).
+    pub calibrated: bool,
+}
+
+/// The error of the worst node of the patch, over requests like this one, µm; left out where too few were measured to say.
+#[derive(Serialize, ToSchema)]
+pub struct ExpectedErrorAnswer {
+    /// Half of them err less.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub median: Option<f64>,
+    /// 95 of 100 err less.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p95: Option<f64>,
 }
 
 /// One effect: simulated or not, and why.
@@ -166,11 +181,23 @@ impl<'a> PredictResponse<'a> {
                 max_pressure_kpa: contact.max_pressure_kpa,
                 max_penetration_um: contact.max_penetration_mm * 1e3,
             },
-            accuracy: AccuracyAnswer { level: prediction.level.name() },
+            accuracy: AccuracyAnswer::from(prediction),
             effects: prediction.effects.iter().map(EffectAnswer::from).collect(),
             solver: SolverAnswer::from(&prediction.solver),
             time_us: TimeAnswer { total: micros(stages.iter().map(|(_, time)| *time).sum()), stages },
             warnings: &prediction.warnings,
+        }
+    }
+}
+
+impl From<&Prediction> for AccuracyAnswer {
+    fn from(prediction: &Prediction) -> Self {
+        let expected = &prediction.expected_error;
+        let known = |um: f64| Some(um).filter(|um| um.is_finite() && expected.p95_um.is_finite());
+        Self {
+            level: prediction.level.name(),
+            expected_error_um: ExpectedErrorAnswer { median: known(expected.median_um), p95: known(expected.p95_um) },
+            calibrated: expected.calibrated,
         }
     }
 }
