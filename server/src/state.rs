@@ -18,6 +18,7 @@ use crate::body::{self, LARGE_AT_ONCE};
 use crate::config::Config;
 use crate::pool::{Pool, PoolError};
 use crate::problem::{Kind, Problem};
+use crate::recording::Recorder;
 use crate::scenes::Scenes;
 use crate::stopwatch::Stopwatch;
 use crate::wire::request::SceneChoice;
@@ -39,14 +40,23 @@ pub struct App {
     large_bodies: Arc<Semaphore>,
     warm_up: Arc<OnceLock<Result<(), Problem>>>,
     time_limit: Duration,
+    recorder: Option<Recorder>,
 }
 
 impl App {
-    /// Starts the numerical threads and the warm-up on the first of them.
+    /// Starts the numerical threads and the warm-up on the first of them. Nothing is recorded.
     ///
     /// # Errors
     /// If the system gives no threads.
     pub fn start(config: &Config) -> io::Result<AppState> {
+        Self::start_recorded(config, None)
+    }
+
+    /// As [`App::start`], and hands what is asked and answered to the recorder; its owner finishes it when the service has ended.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn start_recorded(config: &Config, recorder: Option<Recorder>) -> io::Result<AppState> {
         let scenes = Arc::new(Scenes::new(config.scene_cache_bytes()));
         let warm_up = Arc::new(OnceLock::new());
         let time_limit = config.time_limit();
@@ -67,6 +77,7 @@ impl App {
             scenes,
             warm_up,
             time_limit,
+            recorder,
         }))
     }
 
@@ -77,18 +88,26 @@ impl App {
     pub async fn answer(&self, headers: &HeaderMap, body: Body) -> Result<Vec<u8>, Problem> {
         let body = body::json(headers, body, &self.large_bodies).await?;
         let accepted = Instant::now();
-        let (scenes, limit) = (Arc::clone(&self.scenes), self.time_limit);
+        let (scenes, limit, recorder) = (Arc::clone(&self.scenes), self.time_limit, self.recorder.clone());
         let job = move |workspace: &mut Workspace, abandoned: &dyn Fn() -> bool| {
             let mut stopwatch = Stopwatch::start(accepted, limit, abandoned);
-            answer(body.as_ref(), &scenes, workspace, &mut stopwatch)
+            let answer = answer(body.as_ref(), &scenes, workspace, &mut stopwatch);
+            match recorder {
+                Some(recorder) => recorder.record(body.as_ref(), accepted, answer),
+                None => answer.map(|answer| answer.bytes),
+            }
         };
         self.pool.run(job).await.unwrap_or_else(|error| {
-            Err(match error {
+            let problem = match error {
                 PoolError::Full => {
                     Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
                 }
                 PoolError::Panicked => Problem::internal(error),
-            })
+            };
+            match &self.recorder {
+                Some(recorder) => recorder.record(b"", accepted, Err(problem)),
+                None => Err(problem),
+            }
         })
     }
 
@@ -122,7 +141,7 @@ fn prepare_built_in(scenes: &Scenes, workspace: &mut Workspace) -> Result<(), Pr
                 effects: EffectChoice::Auto,
             };
             let mut stopwatch = Stopwatch::start(Instant::now(), WARM_UP_LIMIT, &|| false);
-            predict(&scene, &request, workspace, &mut stopwatch, Layout::Compact)?;
+            predict(&scene, request, workspace, &mut stopwatch, Layout::Compact)?;
         }
     }
     Ok(())

@@ -10,6 +10,7 @@ mod harness;
 mod load;
 mod program;
 mod properties;
+mod recording;
 mod refusals;
 mod schema;
 mod sockets;
