@@ -80,7 +80,7 @@ pub fn run(args: &ReviewArgs, stopped: &dyn Fn() -> bool, bar: &ProgressBar) -> 
     let scene = understand::built_in(&args.scene).map_err(ReviewError::Scene)?;
     let scene = PreparedScene::new(scene).map_err(|error| ReviewError::Scene(from_predict(error)))?;
     let rest = rest(&scene)?;
-    let log = ReviewLog::open(&args.destination.chosen().ok_or(ReviewError::NoDestination)?)?;
+    let mut log = ReviewLog::open(&args.destination.chosen().ok_or(ReviewError::NoDestination)?)?;
     let mut draws = Draws::new(&scene.scene().tissue, args.seed, args.tip);
     let mut tally = Tally::new(args);
     let mut workspace = Workspace::default();

@@ -27,7 +27,7 @@ const LABEL_Y_MM: f64 = -1.58;
 /// What a colour stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Map {
-    /// Dark violet, green, yellow: how far a node has moved.
+    /// Pale, green, dark blue: how far a node has moved.
     Displacement,
     /// Pale, orange, dark red: how far a node is off.
     Error,
@@ -38,7 +38,7 @@ impl Map {
     fn stops(self) -> &'static [[u8; 3]] {
         match self {
             Map::Displacement => {
-                &[[68, 1, 84], [65, 68, 135], [42, 120, 142], [34, 168, 132], [122, 209, 81], [253, 231, 37]]
+                &[[240, 236, 220], [199, 233, 180], [127, 205, 187], [65, 182, 196], [34, 94, 168], [12, 30, 110]]
             }
             Map::Error => &[[225, 228, 230], [253, 219, 130], [250, 141, 60], [214, 47, 39], [110, 0, 20]],
         }

@@ -5,7 +5,7 @@
 //! | `predicted/…`, `ground_truth/…` (review), `answer/…` (service) | one answer each: | scene frame, mm |
 //! | `…/surface` | deformed patch with vertex normals, coloured by displacement | colours µm |
 //! | `…/edges`, `…/rest` | edges of its triangles, deformed and at rest | mm |
-//! | `…/needle` | the needle where it ended up, true radius and tip | mm |
+//! | `…/needle` | the needle where it ended up, true radius and tip: a mesh, written when the needle changes, and its pose | mm |
 //! | `…/force_1_mm_per_mN`, `…/reaction_1_mm_per_mN` | force of the needle, which ends at the end of the shaft; reaction of the tissue, from the tip | 1 mm per mN |
 //! | `…/scale` | the colours' bar | µm |
 //! | `error/surface` | ground truth, coloured by the distance of each predicted node | colours µm |
@@ -23,18 +23,19 @@
 
 use std::time::UNIX_EPOCH;
 
-use rerun::{
-    Clear, Color, RecordingStream, RecordingStreamResult, Scalars, SeriesLines, SeriesPoints,
-    TextDocument, TextLog, TextLogLevel, ViewCoordinates,
-};
 use rerun::components::MarkerShape;
+use rerun::{
+    Clear, Color, RecordingStream, RecordingStreamResult, Scalars, SeriesLines, SeriesPoints, TextDocument, TextLog,
+    TextLogLevel, ViewCoordinates,
+};
+use retina_core::needle::NeedleShape;
 use retina_core::predict::{Control, Prediction, Request};
 
 use super::colours::{Map, Scale};
 use super::layout::Layout;
 use super::needle_mesh::SHAFT_MM;
 use super::request_text;
-use super::shapes::{EDGE, FORCE, REACTION, REST_EDGE, arrow, edges, error_arrows, needle, surface};
+use super::shapes::{EDGE, FORCE, REACTION, REST_EDGE, arrow, edges, error_arrows, needle, pose, surface};
 use super::{Destination, Exchange, RecordingError, Sink, stream};
 use crate::review::{Compared, Sample};
 
@@ -111,29 +112,50 @@ fn scalar(stream: &RecordingStream, path: &str, value: f64) -> RecordingStreamRe
     stream.log(path, &Scalars::single(value))
 }
 
-/// One answer below `root`.
-fn answer(
-    stream: &RecordingStream,
-    root: &str,
-    request: &Request,
-    prediction: &Prediction,
-    scale: &Scale,
-) -> RecordingStreamResult<()> {
-    let tip = &prediction.needle.tip_mm;
-    stream.log(format!("{root}/surface"), &surface(prediction, &prediction.displacement_um, scale))?;
-    stream.log(format!("{root}/edges"), &edges(&prediction.vertices, &prediction.triangles, EDGE))?;
-    stream.log(format!("{root}/needle"), &needle(&request.needle, tip))?;
-    let force = format!("{root}/force_{ARROW_MM_PER_MN}_mm_per_mN");
-    match &request.control {
-        Control::Force(force_mn) => {
-            let end = tip - request.needle.direction().into_inner() * SHAFT_MM;
-            stream.log(force, &arrow(&(end - force_mn * ARROW_MM_PER_MN), force_mn, "force", FORCE))?;
-        }
-        Control::Pose => stream.log(force, &Clear::flat())?,
+/// The answers below one root.
+struct Answers {
+    root: &'static str,
+    /// The needle that the viewer has; its triangles are written only when it changes.
+    drawn: Option<NeedleShape>,
+}
+
+impl Answers {
+    fn new(root: &'static str) -> Self {
+        Self { root, drawn: None }
     }
-    let reaction = arrow(tip, &prediction.needle.reaction_mn, "reaction", REACTION);
-    stream.log(format!("{root}/reaction_{ARROW_MM_PER_MN}_mm_per_mN"), &reaction)?;
-    bar(stream, root, scale, "displacement")
+
+    fn write(
+        &mut self,
+        stream: &RecordingStream,
+        request: &Request,
+        prediction: &Prediction,
+        scale: &Scale,
+    ) -> RecordingStreamResult<()> {
+        let (root, tip) = (self.root, &prediction.needle.tip_mm);
+        stream.log(format!("{root}/surface"), &surface(prediction, &prediction.displacement_um, scale))?;
+        stream.log(format!("{root}/edges"), &edges(&prediction.vertices, &prediction.triangles, EDGE))?;
+        stream.log(format!("{root}/needle"), &pose(&request.needle, tip))?;
+        if self.drawn != Some(request.needle.shape) {
+            stream.log(format!("{root}/needle"), &needle(&request.needle.shape))?;
+            self.drawn = Some(request.needle.shape);
+        }
+        let force = format!("{root}/force_{ARROW_MM_PER_MN}_mm_per_mN");
+        match &request.control {
+            Control::Force(force_mn) => {
+                let end = tip - request.needle.direction().into_inner() * SHAFT_MM;
+                stream.log(force, &arrow(&(end - force_mn * ARROW_MM_PER_MN), force_mn, "force", FORCE))?;
+            }
+            Control::Pose => stream.log(force, &Clear::flat())?,
+        }
+        let reaction = arrow(tip, &prediction.needle.reaction_mn, "reaction", REACTION);
+        stream.log(format!("{root}/reaction_{ARROW_MM_PER_MN}_mm_per_mN"), &reaction)?;
+        bar(stream, root, scale, "displacement")
+    }
+
+    fn clear(&mut self, stream: &RecordingStream) -> RecordingStreamResult<()> {
+        self.drawn = None;
+        stream.log(self.root, &Clear::recursive())
+    }
 }
 
 fn bar(stream: &RecordingStream, root: &str, scale: &Scale, quantity: &str) -> RecordingStreamResult<()> {
@@ -145,9 +167,26 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
 }
 
+/// The ground truth with what the prediction misses.
+fn error(
+    stream: &RecordingStream,
+    predicted: &Prediction,
+    truth: &Prediction,
+    errors_um: &[f64],
+) -> RecordingStreamResult<()> {
+    let scale = Scale::holding(Map::Error, errors_um);
+    stream.log("error/surface", &surface(truth, errors_um, &scale))?;
+    stream.log("error/edges", &edges(&truth.vertices, &truth.triangles, EDGE))?;
+    let arrows = error_arrows(predicted, truth, errors_um, &scale);
+    stream.log(format!("error/arrows_x{ERROR_MAGNIFICATION}"), &arrows)?;
+    bar(stream, ERROR, &scale, "node error")
+}
+
 /// Writes a review.
 pub struct ReviewLog {
     stream: RecordingStream,
+    predicted: Answers,
+    truth: Answers,
 }
 
 impl ReviewLog {
@@ -158,14 +197,14 @@ impl ReviewLog {
     pub fn open(destination: &Destination) -> Result<Self, RecordingError> {
         let stream = stream::open(destination, REVIEW, Layout::Review)?;
         log_static(&stream, &REVIEW_SERIES).map_err(|error| RecordingError::Write(error.into()))?;
-        Ok(Self { stream })
+        Ok(Self { stream, predicted: Answers::new(PREDICTED), truth: Answers::new(GROUND_TRUTH) })
     }
 
     /// Writes one sample.
     ///
     /// # Errors
     /// [`RecordingError::Write`].
-    pub fn write(&self, sample: &Sample) -> Result<(), RecordingError> {
+    pub fn write(&mut self, sample: &Sample) -> Result<(), RecordingError> {
         self.sample(sample).map_err(|error| RecordingError::Write(error.into()))
     }
 
@@ -177,27 +216,27 @@ impl ReviewLog {
         stream::close(&self.stream)
     }
 
-    fn sample(&self, sample: &Sample) -> RecordingStreamResult<()> {
+    fn sample(&mut self, sample: &Sample) -> RecordingStreamResult<()> {
         let stream = &self.stream;
         stream.set_time_sequence(SAMPLE, sample.index);
         stream.log(REQUEST, &TextDocument::from_markdown(request_text::sample(sample)))?;
         let Compared { predicted, truth, errors_um, statistics } = match &sample.outcome {
             Ok(compared) => compared,
             Err(failure) => {
-                for root in [PREDICTED, GROUND_TRUTH, ERROR] {
-                    stream.log(root, &Clear::recursive())?;
-                }
+                self.predicted.clear(stream)?;
+                self.truth.clear(stream)?;
+                stream.log(ERROR, &Clear::recursive())?;
                 let text = format!("{}: {}", failure.level.name(), failure.problem.detail);
                 return stream.log(FAILURES, &TextLog::new(text).with_level(TextLogLevel::ERROR));
             }
         };
         let shown = [&predicted.prediction, &truth.prediction];
         let scale = Scale::holding(Map::Displacement, shown.iter().flat_map(|shown| &shown.displacement_um));
-        for (root, prediction) in [PREDICTED, GROUND_TRUTH].into_iter().zip(shown) {
-            answer(stream, root, &sample.request, prediction, &scale)?;
-            stream.log(format!("{root}/rest"), &edges(&sample.rest, &prediction.triangles, REST_EDGE))?;
+        for (answers, prediction) in [&mut self.predicted, &mut self.truth].into_iter().zip(shown) {
+            answers.write(stream, &sample.request, prediction, &scale)?;
+            stream.log(format!("{}/rest", answers.root), &edges(&sample.rest, &prediction.triangles, REST_EDGE))?;
         }
-        self.error(&predicted.prediction, &truth.prediction, errors_um)?;
+        error(stream, &predicted.prediction, &truth.prediction, errors_um)?;
         scalar(stream, "statistics/mean", statistics.mean_um)?;
         scalar(stream, "statistics/p99", statistics.p99_um)?;
         scalar(stream, "statistics/max", statistics.max_um)?;
@@ -207,20 +246,12 @@ impl ReviewLog {
         scalar(stream, "iterations/predicted", predicted.prediction.solver.iterations as f64)?;
         scalar(stream, "iterations/ground_truth", truth.prediction.solver.iterations as f64)
     }
-
-    fn error(&self, predicted: &Prediction, truth: &Prediction, errors_um: &[f64]) -> RecordingStreamResult<()> {
-        let scale = Scale::holding(Map::Error, errors_um);
-        self.stream.log("error/surface", &surface(truth, errors_um, &scale))?;
-        self.stream.log("error/edges", &edges(&truth.vertices, &truth.triangles, EDGE))?;
-        let arrows = error_arrows(predicted, truth, errors_um, &scale);
-        self.stream.log(format!("error/arrows_x{ERROR_MAGNIFICATION}"), &arrows)?;
-        bar(&self.stream, ERROR, &scale, "node error")
-    }
 }
 
 /// Writes what a service is asked and answers.
 pub struct ServiceLog {
     stream: RecordingStream,
+    answers: Answers,
 }
 
 impl ServiceLog {
@@ -231,10 +262,10 @@ impl ServiceLog {
     pub fn open(destination: &Destination) -> Result<Self, RecordingError> {
         let stream = stream::open(destination, SERVICE, Layout::Service)?;
         log_static(&stream, &SERVICE_SERIES).map_err(|error| RecordingError::Write(error.into()))?;
-        Ok(Self { stream })
+        Ok(Self { stream, answers: Answers::new(ANSWER) })
     }
 
-    fn exchange(&self, exchange: &Exchange, dropped: u64) -> RecordingStreamResult<()> {
+    fn exchange(&mut self, exchange: &Exchange, dropped: u64) -> RecordingStreamResult<()> {
         let stream = &self.stream;
         let since_epoch = exchange.arrived.duration_since(UNIX_EPOCH).unwrap_or_default();
         stream.set_time_sequence(REQUEST_NUMBER, exchange.number as i64);
@@ -245,12 +276,12 @@ impl ServiceLog {
         match &exchange.outcome {
             Ok((request, prediction)) => {
                 let scale = Scale::holding(Map::Displacement, &prediction.displacement_um);
-                answer(stream, ANSWER, request, prediction, &scale)?;
+                self.answers.write(stream, request, prediction, &scale)?;
                 scalar(stream, "displacement/largest", largest(&prediction.displacement_um))?;
                 scalar(stream, "iterations/answer", prediction.solver.iterations as f64)
             }
             Err(problem) => {
-                stream.log(ANSWER, &Clear::recursive())?;
+                self.answers.clear(stream)?;
                 let text = format!("{}: {}", problem.kind.name(), problem.detail);
                 stream.log(FAILURES, &TextLog::new(text).with_level(TextLogLevel::WARN))
             }

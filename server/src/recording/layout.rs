@@ -5,7 +5,7 @@
 
 use rerun::blueprint::components::{BackgroundKind, PanelState, PlayState};
 use rerun::blueprint::{
-    Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel, Spatial3DView,
+    Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel, Spatial3DView, Tabs,
     TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
 };
 use rerun::external::re_log_types::{BlueprintActivationCommand, StoreId};
@@ -13,13 +13,13 @@ use rerun::external::re_sdk_types::blueprint::archetypes::{Background, EyeContro
 use rerun::log::{Chunk, LogMsg, RowId};
 use rerun::{AsComponents, Color, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, TimePoint, Timeline};
 
-use super::entities::{self as at, ARROW_MM_PER_MN, ERROR_MAGNIFICATION};
+use super::entities::{self as at, ERROR_MAGNIFICATION};
 
 /// Where the camera stands (mm): in front of the patch and above it, near enough to fill a third of a screen.
-const EYE_MM: [f32; 3] = [0.0, -3.3, 2.7];
+const EYE_MM: [f32; 3] = [0.0, -2.9, 1.9];
 
 /// What the camera looks at (mm).
-const TARGET_MM: [f32; 3] = [0.0, -0.2, 0.25];
+const TARGET_MM: [f32; 3] = [0.0, -0.1, 0.3];
 
 /// Dark, so that pale colours stand out.
 const BACKGROUND: [u8; 3] = [24, 27, 33];
@@ -114,41 +114,38 @@ fn plot(name: &str, origin: &str) -> ContainerLike {
 }
 
 fn review(cameras: &mut Vec<String>) -> Vertical {
-    let arrows = format!("arrows: force and reaction, {ARROW_MM_PER_MN} mm per mN");
     let above = Horizontal::new([
-        space(&format!("Predicted (colour: displacement; {arrows})"), at::PREDICTED, cameras),
-        space("Ground truth (same colours)", at::GROUND_TRUTH, cameras),
-        space(
-            &format!("Error (colour: how far predicted nodes are off; arrows: the same × {ERROR_MAGNIFICATION})"),
-            at::ERROR,
-            cameras,
-        ),
+        space("Predicted · displacement", at::PREDICTED, cameras),
+        space("Ground truth · displacement", at::GROUND_TRUTH, cameras),
+        space(&format!("Error of the prediction · arrows × {ERROR_MAGNIFICATION}"), at::ERROR, cameras),
+    ]);
+    let texts = Tabs::new([
+        TextDocumentView::new("Sample").with_origin(at::REQUEST).into(),
+        TextLogView::new("Failures").with_origin(at::FAILURES).into(),
     ]);
     let below = Horizontal::new([
-        TextDocumentView::new("Sample").with_origin(at::REQUEST).into(),
-        plot("Node error (µm)", at::STATISTICS),
-        plot("Largest displacement (µm)", at::DISPLACEMENT),
+        texts.into(),
+        plot("Node error, µm", at::STATISTICS),
+        plot("Displacement, µm", at::DISPLACEMENT),
         plot("Time", at::TIME),
         plot("Newton iterations", at::ITERATIONS),
-        TextLogView::new("Failures").with_origin(at::FAILURES).into(),
     ])
-    .with_column_shares(vec![3.0, 2.0, 2.0, 2.0, 2.0, 1.5]);
-    Vertical::new([above.into(), below.into()]).with_row_shares(vec![3.0, 2.0])
+    .with_column_shares(vec![1.8, 1.2, 1.0, 1.0, 1.0]);
+    Vertical::new([above.into(), below.into()]).with_row_shares(vec![1.5, 1.0])
 }
 
 fn service(cameras: &mut Vec<String>) -> Vertical {
-    let name = format!("Answer (colour: displacement; arrows: force and reaction, {ARROW_MM_PER_MN} mm per mN)");
     let above = Horizontal::new([
-        space(&name, at::ANSWER, cameras),
+        space("Answer · displacement", at::ANSWER, cameras),
         TextDocumentView::new("Asked and answered").with_origin(at::REQUEST).into(),
     ])
     .with_column_shares(vec![2.0, 1.0]);
     let below = Horizontal::new([
-        plot("Largest displacement (µm)", at::DISPLACEMENT),
-        plot("Time (ms)", at::TIME),
+        plot("Displacement, µm", at::DISPLACEMENT),
+        plot("Time, ms", at::TIME),
         plot("Newton iterations", at::ITERATIONS),
-        plot("Requests that are missing here", at::DROPPED),
+        plot("Missing in this recording", at::DROPPED),
         TextLogView::new("Problems").with_origin(at::FAILURES).into(),
     ]);
-    Vertical::new([above.into(), below.into()]).with_row_shares(vec![2.0, 1.0])
+    Vertical::new([above.into(), below.into()]).with_row_shares(vec![1.5, 1.0])
 }

@@ -1,21 +1,21 @@
 //! Triangles of a needle, to be looked at.
 //!
 //! Contract: every vertex lies on the needle's real surface, at its true radius and with the true shape of its tip; the mesh is closed
-//! where the shaft is cut off. Coordinates are the scene's. Units: mm.
+//! where the shaft is cut off. Coordinates are the needle's own: the tip at the origin, the shaft towards +z. Units: mm.
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Point3, Unit, Vector3};
-use retina_core::needle::Needle;
+use nalgebra::{Point3, Unit, Vector3};
+use retina_core::needle::NeedleShape;
 
 /// Length of the shaft that is drawn, from the tip (mm).
-pub const SHAFT_MM: f64 = 2.2;
+pub const SHAFT_MM: f64 = 1.5;
 
 /// Vertices around the shaft.
-const AROUND: usize = 48;
+const AROUND: usize = 32;
 
 /// Rings over the rounded edge, from the end plane to the shaft.
-const RINGS: usize = 16;
+const RINGS: usize = 8;
 
 /// How far the first and the last ring keep from the directions of the end plane and of the shaft, where no single point is
 /// foremost.
@@ -24,7 +24,7 @@ const MARGIN: f64 = 1e-5;
 /// A closed mesh of a needle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NeedleMesh {
-    /// Scene coordinates (mm).
+    /// Needle-local (mm).
     pub vertices: Vec<Point3<f64>>,
     /// Unit, outwards.
     pub normals: Vec<Vector3<f64>>,
@@ -33,10 +33,9 @@ pub struct NeedleMesh {
 }
 
 impl NeedleMesh {
-    /// The needle with its foremost point at `tip_mm` (mm).
-    pub fn new(needle: &Needle, tip_mm: &Point3<f64>) -> Self {
-        let body = needle.shape.body();
-        let scene_from_needle = Isometry3::from_parts((*tip_mm).into(), needle.orientation);
+    /// A needle of that shape.
+    pub fn new(shape: &NeedleShape) -> Self {
+        let body = shape.body();
         let mut mesh = Self::default();
         let face = body.face_normal();
         let centre = mesh.add(body.foremost_along(&face), face);
@@ -66,7 +65,7 @@ impl NeedleMesh {
         let lid: Vec<u32> = mesh.ring(|aside| (end(aside).0, Vector3::z_axis())).into_iter().rev().collect();
         let middle = mesh.add(Some(Point3::new(body.axis_x_mm(), 0.0, SHAFT_MM)), Vector3::z_axis());
         mesh.fan(middle, &lid);
-        mesh.place(&scene_from_needle)
+        mesh
     }
 
     /// A missing point, which only a direction along the shaft would have, becomes the tip.
@@ -97,11 +96,5 @@ impl NeedleMesh {
             self.triangles.push([lower[step], lower[next], upper[next]]);
             self.triangles.push([lower[step], upper[next], upper[step]]);
         }
-    }
-
-    fn place(mut self, scene_from_needle: &Isometry3<f64>) -> Self {
-        self.vertices.iter_mut().for_each(|vertex| *vertex = scene_from_needle * *vertex);
-        self.normals.iter_mut().for_each(|normal| *normal = scene_from_needle * *normal);
-        self
     }
 }

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use nalgebra::Vector3;
 use retina_core::needle::Tip;
-use retina_core::predict::{Control, Prediction, Request};
+use retina_core::predict::{Control, Level, Prediction, Request};
 use serde_json::{Value, json};
 
 use super::Exchange;
@@ -16,7 +16,9 @@ use crate::review::{Compared, Sample};
 /// A sample: how far off the prediction is, the two answers in a table, the request.
 pub fn sample(sample: &Sample) -> String {
     let level = sample.request.level.name();
-    let mut text = format!("# Sample {} · {}\n", sample.index, sample.scene);
+    let truth = Level::Reference.name();
+    let mut text = format!("# Sample {}: `{level}` beside `{truth}`\n", sample.index);
+    let _ = writeln!(text, "{} on `{}`\n", needle_words(&sample.request), sample.scene);
     match &sample.outcome {
         Ok(Compared { predicted, truth, statistics, .. }) => {
             let largest_um = truth.prediction.displacement_um.iter().copied().fold(0.0, f64::max);
@@ -28,7 +30,7 @@ pub fn sample(sample: &Sample) -> String {
                 statistics.mean_um, statistics.max_um, statistics.p99_um
             );
             let (a, b) = (&predicted.prediction, &truth.prediction);
-            let _ = writeln!(text, "| | predicted (`{level}`) | ground truth (`{}`) |\n|---|---|---|", b.level.name());
+            let _ = writeln!(text, "| | predicted | ground truth |\n|---|---|---|");
             let mut row = |name: &str, a: String, b: String| {
                 let _ = writeln!(text, "| {name} | {a} | {b} |");
             };
@@ -54,6 +56,22 @@ pub fn sample(sample: &Sample) -> String {
     }
     let _ = writeln!(text, "\n## The request\n\n```json\n{}\n```", request_json(&sample.scene, &sample.request));
     text
+}
+
+/// The question in a line.
+fn needle_words(request: &Request) -> String {
+    let needle = &request.needle;
+    let tip = match needle.shape.tip {
+        Tip::Hemispherical => "hemispherical",
+        Tip::Flat { .. } => "flat",
+        Tip::Bevelled { .. } => "bevelled",
+    };
+    let tilt_deg = needle.direction().angle(&-Vector3::z()).to_degrees();
+    let asked = match request.control {
+        Control::Force(force_mn) => format!("pushed with {:.3} mN", force_mn.norm()),
+        Control::Pose => "held where it is".to_owned(),
+    };
+    format!("A {tip} needle of {:.3} mm radius, tilted by {tilt_deg:.0}°, {asked}", needle.shape.radius_mm)
 }
 
 /// What a table says of an answer besides its cost.

@@ -3,8 +3,9 @@
 //! Contract: coordinates stay the scene's, in mm; nothing is exaggerated but where `entities` says so in a name.
 
 use nalgebra::{Point3, Vector3};
-use rerun::{Arrows3D, Color, LineStrips3D, Mesh3D};
-use retina_core::needle::Needle;
+use rerun::datatypes::Quaternion;
+use rerun::{Arrows3D, Color, LineStrips3D, Mesh3D, Transform3D};
+use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::Prediction;
 
 use super::colours::Scale;
@@ -13,12 +14,12 @@ use super::needle_mesh::NeedleMesh;
 
 const EDGE_RADIUS_MM: f32 = 0.003;
 const ARROW_RADIUS_MM: f32 = 0.02;
-const ERROR_ARROW_RADIUS_MM: f32 = 0.008;
+const ERROR_ARROW_RADIUS_MM: f32 = 0.012;
 /// Edges of a deformed surface.
 pub const EDGE: Color = Color(rerun::datatypes::Rgba32(0x0a0a_0aff));
 /// Edges of a surface at rest.
 pub const REST_EDGE: Color = Color(rerun::datatypes::Rgba32(0x9aa3_ad60));
-const STEEL: [u8; 4] = [190, 198, 208, 90];
+const STEEL: [u8; 4] = [190, 198, 208, 70];
 /// Force of the needle.
 pub const FORCE: Color = Color(rerun::datatypes::Rgba32(0xffb0_20ff));
 /// Force of the tissue.
@@ -50,13 +51,20 @@ pub fn edges(vertices: &[Point3<f64>], triangles: &[[usize; 3]], colour: Color) 
     LineStrips3D::new(strips).with_radii([EDGE_RADIUS_MM]).with_colors([colour])
 }
 
-/// The needle with its foremost point at `tip_mm`.
-pub fn needle(needle: &Needle, tip_mm: &Point3<f64>) -> Mesh3D {
-    let NeedleMesh { vertices, normals, triangles } = NeedleMesh::new(needle, tip_mm);
+/// A needle in its own coordinates.
+pub fn needle(shape: &NeedleShape) -> Mesh3D {
+    let NeedleMesh { vertices, normals, triangles } = NeedleMesh::new(shape);
     Mesh3D::new(vertices.iter().map(point))
         .with_triangle_indices(triangles)
         .with_vertex_normals(normals.iter().map(vector))
         .with_albedo_factor(STEEL)
+}
+
+/// Takes the needle from its own coordinates to where it ended up, foremost point at `tip_mm`.
+pub fn pose(needle: &Needle, tip_mm: &Point3<f64>) -> Transform3D {
+    let quaternion: [f64; 4] = needle.orientation.coords.into();
+    let quaternion = Quaternion::from_xyzw(quaternion.map(|part| part as f32));
+    Transform3D::from_translation(point(tip_mm)).with_quaternion(quaternion)
 }
 
 /// A force from `origin` (mm), with its length in words.

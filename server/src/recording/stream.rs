@@ -15,7 +15,11 @@ const CLOSE_PATIENCE: Duration = Duration::from_secs(8);
 ///
 /// # Errors
 /// [`RecordingError::Open`].
-pub fn open(destination: &Destination, application: &'static str, layout: Layout) -> Result<RecordingStream, RecordingError> {
+pub fn open(
+    destination: &Destination,
+    application: &'static str,
+    layout: Layout,
+) -> Result<RecordingStream, RecordingError> {
     let refuse = |cause: Box<dyn Error + Send + Sync>| RecordingError::Open { destination: destination.clone(), cause };
     // Whoever asks for a recording gets it, whatever the environment variable RERUN says.
     let builder = RecordingStreamBuilder::new(application).enabled(true);
