@@ -16,13 +16,13 @@ const SQUARES: usize = 32;
 const HALF_LENGTH_MM: f64 = 0.5 * SPACING_MM * (NODES_PER_SIDE - 1) as f64;
 
 /// The bar lies in front of the patch, from this y to this y (mm).
-const BAR_Y_MM: [f64; 2] = [-1.45, -1.33];
+const BAR_Y_MM: [f64; 2] = [-1.36, -1.26];
 
 /// Height at which the bar lies (mm).
 const BAR_Z_MM: f64 = 0.0;
 
 /// Where the numbers stand (mm).
-const LABEL_Y_MM: f64 = -1.58;
+const LABEL_Y_MM: f64 = -1.5;
 
 /// What a colour stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -143,12 +143,14 @@ impl Answers {
         match &request.control {
             Control::Force(force_mn) => {
                 let end = tip - request.needle.direction().into_inner() * SHAFT_MM;
-                stream.log(force, &arrow(&(end - force_mn * ARROW_MM_PER_MN), force_mn, "force", FORCE))?;
+                let push = arrow(&(end - force_mn * ARROW_MM_PER_MN), force_mn, "force", FORCE);
+                stream.log(force, &push.with_show_labels(true))?;
             }
             Control::Pose => stream.log(force, &Clear::flat())?,
         }
         let reaction = arrow(tip, &prediction.needle.reaction_mn, "reaction", REACTION);
-        stream.log(format!("{root}/reaction_{ARROW_MM_PER_MN}_mm_per_mN"), &reaction)?;
+        // Its words would hide the contact; the viewer shows them under the mouse.
+        stream.log(format!("{root}/reaction_{ARROW_MM_PER_MN}_mm_per_mN"), &reaction.with_show_labels(false))?;
         bar(stream, root, scale, "displacement")
     }
 

@@ -16,10 +16,10 @@ use rerun::{AsComponents, Color, RecordingStream, RecordingStreamBuilder, Record
 use super::entities::{self as at, ERROR_MAGNIFICATION};
 
 /// Where the camera stands (mm): in front of the patch and above it, near enough to fill a third of a screen.
-const EYE_MM: [f32; 3] = [0.0, -2.9, 1.9];
+const EYE_MM: [f32; 3] = [0.0, -3.1, 2.1];
 
 /// What the camera looks at (mm).
-const TARGET_MM: [f32; 3] = [0.0, -0.1, 0.3];
+const TARGET_MM: [f32; 3] = [0.0, -0.3, 0.15];
 
 /// Dark, so that pale colours stand out.
 const BACKGROUND: [u8; 3] = [24, 27, 33];

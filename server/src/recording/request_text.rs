@@ -74,8 +74,11 @@ fn needle_words(request: &Request) -> String {
     format!("A {tip} needle of {:.3} mm radius, tilted by {tilt_deg:.0}°, {asked}", needle.shape.radius_mm)
 }
 
+/// A number of an answer, with its name and unit.
+type Number = (&'static str, fn(&Prediction) -> f64);
+
 /// What a table says of an answer besides its cost.
-const NUMBERS: [(&str, fn(&Prediction) -> f64); 5] = [
+const NUMBERS: [Number; 5] = [
     ("travel (mm)", |answer| answer.needle.travel_mm),
     ("reaction (mN)", |answer| answer.needle.reaction_mn.norm()),
     ("contact area (mm²)", |answer| answer.contact.area_mm2),

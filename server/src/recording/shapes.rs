@@ -74,7 +74,6 @@ pub fn arrow(origin: &Point3<f64>, force_mn: &Vector3<f64>, name: &str, colour: 
         .with_radii([ARROW_RADIUS_MM])
         .with_colors([colour])
         .with_labels([format!("{name} {:.3} mN", force_mn.norm())])
-        .with_show_labels(true)
 }
 
 /// From each true node towards the predicted one, magnified.
