@@ -149,12 +149,13 @@ fn a_drawn_needle_is_the_needle() {
             assert!(outwards > 0.0 || lid, "{shape:?}: the normal at {vertex} points inwards");
             assert!((normal.norm() - 1.0).abs() < 1e-9);
         }
-        // Outward triangles: the enclosed volume, from the divergence theorem, is positive and near that of the shaft.
+        // Outward triangles: the enclosed volume, from the divergence theorem, is positive and near that of the shaft, of which the
+        // bevel's cut takes 29 %.
         let corner = |index: u32| mesh.vertices[index as usize].coords;
         let volume: f64 =
             mesh.triangles.iter().map(|t| corner(t[0]).dot(&corner(t[1]).cross(&corner(t[2]))) / 6.0).sum();
         let shaft = std::f64::consts::PI * shape.radius_mm * shape.radius_mm * SHAFT_MM;
-        assert!(volume > 0.75 * shaft && volume < shaft, "{shape:?}: {volume} of {shaft}");
+        assert!(volume > 0.65 * shaft && volume < shaft, "{shape:?}: {volume} of {shaft}");
         let lowest = mesh.vertices.iter().map(|vertex| vertex.z).fold(f64::INFINITY, f64::min);
         assert!(lowest.abs() < 2e-3, "{shape:?}: the tip is at {lowest}");
     }
