@@ -5,6 +5,7 @@
 
 pub mod approach;
 pub mod assemble;
+pub mod comparison;
 pub mod effect;
 pub mod effects;
 pub mod equilibrium;
@@ -19,3 +20,4 @@ pub mod scene;
 pub mod solve;
 pub mod surface;
 pub mod tissue;
+pub mod working_range;

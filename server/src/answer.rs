@@ -5,7 +5,7 @@
 use std::time::Instant;
 
 use retina_core::predict::budget::{Budget, DEFAULT_LEVEL};
-use retina_core::predict::{PreparedScene, Request, Workspace};
+use retina_core::predict::{Prediction, PreparedScene, Request, Workspace};
 use retina_core::progress::Progress as _;
 
 use crate::problem::{Problem, from_predict};
@@ -17,6 +17,17 @@ use crate::understand;
 use crate::wire::{PredictRequest, PredictResponse};
 use crate::write::{Layout, write};
 
+/// An answer with what led to it.
+#[derive(Debug)]
+pub struct Answer {
+    /// The response.
+    pub bytes: Vec<u8>,
+    /// The question as it was understood.
+    pub request: Request,
+    /// What the core said.
+    pub prediction: Prediction,
+}
+
 /// The answer to the request in `body`.
 ///
 /// # Errors
@@ -27,7 +38,7 @@ pub fn answer(
     times: &Times,
     workspace: &mut Workspace,
     stopwatch: &mut Stopwatch,
-) -> Result<Vec<u8>, Problem> {
+) -> Result<Answer, Problem> {
     let message: PredictRequest = read(body)?;
     let request = understand::request(&message)?;
     let budget = understand::budget(message.accuracy.as_ref())?;
@@ -56,7 +67,7 @@ pub fn predict(
     workspace: &mut Workspace,
     stopwatch: &mut Stopwatch,
     layout: Layout,
-) -> Result<Vec<u8>, Problem> {
+) -> Result<Answer, Problem> {
     let Question { mut request, mut budget, times } = question;
     let mut broken = Vec::new();
     request.level = match budget.level {
@@ -76,5 +87,6 @@ pub fn predict(
     times.record(request.level, start.elapsed());
     prediction.warnings.append(&mut broken);
     let response = PredictResponse::new(&prediction, stopwatch.finish());
-    write(&response, layout).map_err(Problem::internal)
+    let bytes = write(&response, layout).map_err(Problem::internal)?;
+    Ok(Answer { bytes, request, prediction })
 }

@@ -1,4 +1,4 @@
-//! The program: serve, or answer one request from a file.
+//! The program: serve, answer one request from a file, or review a level.
 //!
 //! Contract of `predict`: the response goes to standard output and is that of `POST /v1/predict`; a problem goes to standard error as the
 //! same document that HTTP has, and the program ends with 1. The command line is at fault: 2.
@@ -19,15 +19,22 @@ use tokio_util::sync::CancellationToken;
 use tracing_subscriber::EnvFilter;
 
 use crate::answer::{Question, predict};
-use crate::config::{Command, CommandLine, Config, LogForm, PredictArgs};
+use crate::config::{Command, CommandLine, Config, LogForm, PredictArgs, ReviewArgs};
 use crate::problem::{Kind, Problem, from_predict};
 use crate::read::read;
+use crate::recording::{self, Recorder, Totals};
 use crate::stopwatch::Stopwatch;
 use crate::times::Times;
 use crate::understand;
 use crate::wire::PredictRequest;
 use crate::write::Layout;
 use crate::{App, page, run};
+
+/// Exit code where the command line asks for what cannot be.
+const COMMAND_LINE_AT_FAULT: u8 = 2;
+
+/// How long what was answered may still take to be recorded after the service has ended.
+const RECORDING_PATIENCE: Duration = Duration::from_secs(10);
 
 /// Where the program reads from and writes to.
 pub struct Streams<'a> {
@@ -50,6 +57,7 @@ pub fn main() -> ExitCode {
                 Err(_) => ExitCode::FAILURE,
             }
         }
+        Some(Command::Review(args)) => review(&args),
         Some(Command::Serve(config)) => serve(&config),
         None => serve(&config),
     }
@@ -57,7 +65,19 @@ pub fn main() -> ExitCode {
 
 fn serve(config: &Config) -> ExitCode {
     start_log(config.log);
-    match serve_until_ctrl_c(config) {
+    let recorder = match config.recording().map(|destination| recording::start(&destination)).transpose() {
+        Ok(recorder) => recorder,
+        Err(error) => {
+            tracing::error!(%error, "not started");
+            return ExitCode::from(COMMAND_LINE_AT_FAULT);
+        }
+    };
+    let ended = serve_until_ctrl_c(config, recorder.clone());
+    if let Some(recorder) = recorder {
+        let Totals { written, dropped, failed, closed } = recorder.finish(RECORDING_PATIENCE);
+        tracing::info!(written, dropped, failed, complete = closed, "the recording ended");
+    }
+    match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             tracing::error!(%error, listen = %config.listen, "the service ended");
@@ -68,7 +88,7 @@ fn serve(config: &Config) -> ExitCode {
 
 /// One thread talks: the numerical threads do the work, and handing it to one of several talking threads costs a wake-up more.
 #[tokio::main(flavor = "current_thread")]
-async fn serve_until_ctrl_c(config: &Config) -> io::Result<()> {
+async fn serve_until_ctrl_c(config: &Config, recorder: Option<Recorder>) -> io::Result<()> {
     let listener = tokio::net::TcpListener::bind(config.listen).await?;
     let address = listener.local_addr()?;
     tracing::info!("listening on http://{address}, the API is at http://{address}/docs");
@@ -84,7 +104,19 @@ async fn serve_until_ctrl_c(config: &Config) -> io::Result<()> {
             stop.cancel();
         }
     });
-    run(listener, App::start(config)?, shutdown).await
+    run(listener, App::start_recorded(config, recorder)?, shutdown).await
+}
+
+#[cfg(feature = "rerun")]
+fn review(args: &ReviewArgs) -> ExitCode {
+    start_log(LogForm::Pretty);
+    crate::review::main(args)
+}
+
+#[cfg(not(feature = "rerun"))]
+fn review(_args: &ReviewArgs) -> ExitCode {
+    eprintln!("retina-server review: {}", recording::RecordingError::NotBuilt);
+    ExitCode::from(COMMAND_LINE_AT_FAULT)
 }
 
 fn start_log(form: LogForm) {
@@ -105,7 +137,7 @@ pub fn predict_file(args: &PredictArgs, streams: Streams) -> io::Result<u8> {
         Ok(body) => body,
         Err(error) => {
             writeln!(streams.problems, "{}: {error}", args.request.display())?;
-            return Ok(2);
+            return Ok(COMMAND_LINE_AT_FAULT);
         }
     };
     let layout = match args.pretty {
@@ -147,7 +179,7 @@ fn answer(body: &[u8], mesh: Option<&Path>, layout: Layout) -> Result<Vec<u8>, P
     stopwatch.stage("prepare");
     let scene = PreparedScene::new(scene).map_err(from_predict)?;
     let question = Question { request, budget, times: &Times::default() };
-    predict(&scene, question, &mut Workspace::default(), &mut stopwatch, layout)
+    predict(&scene, question, &mut Workspace::default(), &mut stopwatch, layout).map(|answer| answer.bytes)
 }
 
 fn replace_surface(scene: &mut Scene, path: &Path) -> Result<(), Problem> {

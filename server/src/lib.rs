@@ -2,7 +2,8 @@
 //!
 //! Read in this order: `routes` (every URL), `handlers`, [`wire`] (every message), `understand` (from the wire to the core),
 //! `answer` (one request from bytes to bytes), `pool` and `scenes` (where it runs and what is kept), [`page`] (what a browser
-//! sees). [`config`] is what the program can be told, [`problem`] how it says no.
+//! sees). [`config`] is what the program can be told, [`problem`] how it says no. [`recording`] is a guest that looks on, `review`
+//! compares levels for the eye.
 //!
 //! Not here: numerics, which are `retina_core`'s; this crate only brings questions to it and answers back.
 
@@ -16,6 +17,9 @@ pub mod page;
 pub mod pool;
 pub mod problem;
 mod read;
+pub mod recording;
+#[cfg(feature = "rerun")]
+pub mod review;
 mod routes;
 mod run;
 pub mod scenes;

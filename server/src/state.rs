@@ -19,6 +19,7 @@ use crate::body::{self, LARGE_AT_ONCE};
 use crate::config::Config;
 use crate::pool::{Pool, PoolError};
 use crate::problem::{Kind, Problem};
+use crate::recording::Recorder;
 use crate::scenes::Scenes;
 use crate::stopwatch::Stopwatch;
 use crate::times::Times;
@@ -42,14 +43,23 @@ pub struct App {
     warm_up: Arc<OnceLock<Result<(), Problem>>>,
     times: Arc<Times>,
     time_limit: Duration,
+    recorder: Option<Recorder>,
 }
 
 impl App {
-    /// Starts the numerical threads and the warm-up on the first of them.
+    /// Starts the numerical threads and the warm-up on the first of them. Nothing is recorded.
     ///
     /// # Errors
     /// If the system gives no threads.
     pub fn start(config: &Config) -> io::Result<AppState> {
+        Self::start_recorded(config, None)
+    }
+
+    /// As [`App::start`], and hands what is asked and answered to the recorder; its owner finishes it when the service has ended.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn start_recorded(config: &Config, recorder: Option<Recorder>) -> io::Result<AppState> {
         let scenes = Arc::new(Scenes::new(config.scene_cache_bytes()));
         let warm_up = Arc::new(OnceLock::new());
         let time_limit = config.time_limit();
@@ -72,6 +82,7 @@ impl App {
             warm_up,
             times,
             time_limit,
+            recorder,
         }))
     }
 
@@ -83,17 +94,26 @@ impl App {
         let body = body::json(headers, body, &self.large_bodies).await?;
         let accepted = Instant::now();
         let (scenes, times, limit) = (Arc::clone(&self.scenes), Arc::clone(&self.times), self.time_limit);
+        let recorder = self.recorder.clone();
         let job = move |workspace: &mut Workspace, abandoned: &dyn Fn() -> bool| {
             let mut stopwatch = Stopwatch::start(accepted, limit, abandoned);
-            answer(body.as_ref(), &scenes, &times, workspace, &mut stopwatch)
+            let answer = answer(body.as_ref(), &scenes, &times, workspace, &mut stopwatch);
+            match recorder {
+                Some(recorder) => recorder.record(body.as_ref(), accepted, answer),
+                None => answer.map(|answer| answer.bytes),
+            }
         };
         self.pool.run(job).await.unwrap_or_else(|error| {
-            Err(match error {
+            let problem = match error {
                 PoolError::Full => {
                     Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
                 }
                 PoolError::Panicked => Problem::internal(error),
-            })
+            };
+            match &self.recorder {
+                Some(recorder) => recorder.record(b"", accepted, Err(problem)),
+                None => Err(problem),
+            }
         })
     }
 

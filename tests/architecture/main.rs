@@ -165,6 +165,18 @@ fn one_file_names_faer() {
 }
 
 #[test]
+fn the_recording_alone_names_rerun_and_one_file_of_it_logs() {
+    let sources = sources("server/src");
+    let found = breaches(&sources, |name, line| line.contains("rerun::") && !name.starts_with("server/src/recording/"));
+    assert!(found.is_empty(), "{found:#?}");
+    let logs = |line: &str| line.contains("stream.log(") || line.contains("stream.log_static(");
+    let entities = "server/src/recording/entities.rs";
+    let found = breaches(&sources, |name, line| logs(line) && name != entities);
+    assert!(found.is_empty(), "{found:#?}");
+    assert!(!breaches(&sources, |name, line| logs(line) && name == entities).is_empty(), "the check sees nothing");
+}
+
+#[test]
 fn modules_of_core_know_only_those_before_them() {
     let sources = sources("core/src");
     for (place, forbidden) in ONE_WAY {

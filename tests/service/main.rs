@@ -12,6 +12,7 @@ mod load;
 mod page;
 mod program;
 mod properties;
+mod recording;
 mod refusals;
 mod schema;
 mod sockets;

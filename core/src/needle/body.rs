@@ -104,6 +104,11 @@ impl Body {
         self.axis_x
     }
 
+    /// Outward normal of the end face, needle-local: straight forwards for half a ball, which has no face.
+    pub fn face_normal(&self) -> Unit<Vector3<f64>> {
+        Unit::new_unchecked(Vector3::new(self.plane_normal.0, 0.0, self.plane_normal.1))
+    }
+
     /// Radius of the shaft (mm).
     pub fn radius_mm(&self) -> f64 {
         self.core_radius + self.edge_radius

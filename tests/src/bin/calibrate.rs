@@ -16,8 +16,8 @@ use retina_core::predict::expected_error::{BINS, STRAIN_BINS, bin};
 use retina_core::predict::{Level, PreparedScene, Request, Workspace};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
-use retina_tests::statistics::{node_errors_um, quantile};
-use retina_tests::working_range::WorkingRange;
+use retina_core::comparison::{node_errors_um, quantile};
+use retina_core::working_range::WorkingRange;
 use serde::{Deserialize, Serialize};
 
 /// Requests per run unless told.
