@@ -42,7 +42,8 @@ impl Budget {
     /// # Errors
     /// [`PredictError::Budget`] where no level keeps the promises and the budget is strict.
     pub fn choose(&self, situation: &Situation, times_ms: &LevelTimes) -> Result<Choice, PredictError> {
-        let entries = || Level::ALL.into_iter().zip(*times_ms).map(|(level, ms)| (level, ms, situation.expected_error(level)));
+        let entries =
+            || Level::ALL.into_iter().zip(*times_ms).map(|(level, ms)| (level, ms, situation.expected_error(level)));
         let in_time = |ms: f64| self.max_time_ms.is_none_or(|most| ms <= most);
         let exact = |error: &ExpectedError| self.max_error_um.is_none_or(|most| error.p95_um <= most);
         let latest_in_time = || entries().filter(|(_, ms, _)| in_time(*ms)).last();
@@ -51,10 +52,9 @@ impl Budget {
             (Some(level), ..) => entries().find(|(entry, ..)| *entry == level),
             (None, None, None) => entries().find(|(entry, ..)| *entry == DEFAULT_LEVEL),
             (None, None, Some(_)) => latest_in_time().or_else(cheapest),
-            (None, Some(_), _) => entries()
-                .find(|(_, ms, error)| in_time(*ms) && exact(error))
-                .or_else(latest_in_time)
-                .or_else(cheapest),
+            (None, Some(_), _) => {
+                entries().find(|(_, ms, error)| in_time(*ms) && exact(error)).or_else(latest_in_time).or_else(cheapest)
+            }
         }
         .unwrap_or((DEFAULT_LEVEL, times_ms[1], situation.expected_error(DEFAULT_LEVEL)));
         let mut broken = Vec::new();
@@ -67,7 +67,10 @@ impl Budget {
             broken.push(format!("level `{}` {why}", level.name()));
         }
         if let Some(most) = self.max_time_ms.filter(|_| !in_time(ms)) {
-            broken.push(format!("level `{}` is expected to take {ms:.3} ms, more than the {most} ms asked for", level.name()));
+            broken.push(format!(
+                "level `{}` is expected to take {ms:.3} ms, more than the {most} ms asked for",
+                level.name()
+            ));
         }
         if self.strict && !broken.is_empty() {
             return Err(PredictError::Budget { problem: broken.join("; ") });

@@ -11,12 +11,12 @@ use std::fs::{self, OpenOptions};
 use std::io::Write as _;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use retina_core::comparison::{node_errors_um, quantile};
 use retina_core::needle::Tip;
 use retina_core::predict::expected_error::{BINS, STRAIN_BINS, bin};
 use retina_core::predict::{Level, PreparedScene, Request, Workspace};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
-use retina_core::comparison::{node_errors_um, quantile};
 use retina_core::working_range::WorkingRange;
 use serde::{Deserialize, Serialize};
 
@@ -100,9 +100,10 @@ fn measure(
     let situation = scene.situation(request)?;
     let mut answer = |level| scene.predict(&Request { level, ..request.clone() }, workspace, &mut Silent);
     let worst_um = match (answer(Level::Reference), answer(Level::Linear), answer(Level::Coarse)) {
-        (Ok(truth), Ok(linear), Ok(coarse)) => Some([linear, coarse].map(|answer| {
-            node_errors_um(&answer.vertices, &truth.vertices).into_iter().fold(0.0, f64::max)
-        })),
+        (Ok(truth), Ok(linear), Ok(coarse)) => Some(
+            [linear, coarse]
+                .map(|answer| node_errors_um(&answer.vertices, &truth.vertices).into_iter().fold(0.0, f64::max)),
+        ),
         _ => None,
     };
     let edged = request.needle.shape.tip != Tip::Hemispherical;
