@@ -217,6 +217,11 @@ impl<'a> Wall<'a> {
         self.topology
     }
 
+    /// The inner surface's faces at rest.
+    pub fn faces(&self) -> &ContactFaces {
+        &self.faces
+    }
+
     /// Rest positions with the needle's tip at its given pose.
     pub fn start(&self) -> Vec<f64> {
         let mut positions = self.geometry.rest.clone();

@@ -16,6 +16,7 @@ pub mod predict;
 pub mod progress;
 pub mod range;
 pub mod scene;
+pub mod sequence;
 pub mod solve;
 pub mod surface;
 pub mod tissue;

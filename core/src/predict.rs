@@ -8,7 +8,7 @@ pub mod beds;
 pub mod choice;
 pub mod finite_element;
 pub mod linear;
-mod topologies;
+pub(crate) mod topologies;
 pub mod types;
 
 pub use types::*;
@@ -17,6 +17,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Unit, Vector3};
 
+use crate::effects::contact;
 use crate::equilibrium::{Motion, Tool};
 use crate::mesh::wall::WallTopology;
 use crate::needle::Body;
@@ -110,38 +111,61 @@ impl PreparedScene {
         progress.stage("linear");
         request.needle.validate()?;
         let body = request.needle.shape.body();
-        let first = self.question(request, &body, &request.needle.tip_mm)?;
-        let question = match self.scene.surface {
-            // The patch is the nodes nearest to the contact: cut again where the needle touches.
-            SceneSurface::Mesh(_) => match press(first.patch(), &first.tool, &first.motion) {
-                Ok(press) => {
-                    let [x, y] = press.touch.parameter;
-                    let touch = first.patch().surface.column(x, y).surface;
-                    let touch_in_scene = first.patch().scene_from_patch * touch;
-                    self.question(request, &body, &touch_in_scene)?
-                }
-                Err(_) => first,
-            },
-            _ => first,
-        };
-        question.answer(resolution, workspace, progress)
+        let patch = self.patch_for(request, &body)?;
+        Question::new(self, request, &body, patch).answer(resolution, workspace, progress)
     }
 
-    /// The request in the frame of the patch around `contact`.
-    fn question<'a>(
-        &'a self,
-        request: &'a Request,
-        body: &'a Body,
-        contact: &Point3<f64>,
-    ) -> Result<Question<'a>, PredictError> {
-        let patch = match &self.patch {
+    /// The patch of a request: the scene's own, or the nodes of its mesh nearest to where the needle touches.
+    pub(crate) fn patch_for(&self, request: &Request, body: &Body) -> Result<CutOrGrid<'_>, PredictError> {
+        if let Some(patch) = &self.patch {
+            return Ok(CutOrGrid::Grid(patch));
+        }
+        let tip = request.needle.tip_mm;
+        let first = Question::new(self, request, body, self.patch_around(&tip)?);
+        let around = press(first.patch(), &first.tool, &first.motion).map(|press| {
+            let [x, y] = press.touch.parameter;
+            first.patch().scene_from_patch * first.patch().surface.column(x, y).surface
+        });
+        self.patch_around(&around.unwrap_or(tip))
+    }
+
+    /// The patch of a contact (scene coordinates).
+    fn patch_around(&self, contact: &Point3<f64>) -> Result<CutOrGrid<'_>, PredictError> {
+        Ok(match &self.patch {
             Some(patch) => CutOrGrid::Grid(patch),
             None => CutOrGrid::Cut(Box::new(self.scene.patch(contact)?)),
-        };
-        let frame = match &patch {
-            CutOrGrid::Grid(patch) => patch.scene_from_patch,
-            CutOrGrid::Cut(patch) => patch.scene_from_patch,
-        };
+        })
+    }
+}
+
+/// A grid's patch is the scene's, a cut one the request's own.
+pub(crate) enum CutOrGrid<'a> {
+    Grid(&'a Patch),
+    Cut(Box<Patch>),
+}
+
+impl CutOrGrid<'_> {
+    pub(crate) fn patch(&self) -> &Patch {
+        match self {
+            CutOrGrid::Grid(patch) => patch,
+            CutOrGrid::Cut(patch) => patch,
+        }
+    }
+}
+
+/// A request in the patch frame.
+pub(crate) struct Question<'a> {
+    pub(crate) prepared: &'a PreparedScene,
+    pub(crate) request: &'a Request,
+    patch: CutOrGrid<'a>,
+    pub(crate) tool: Tool<'a>,
+    pub(crate) motion: Motion,
+}
+
+impl<'a> Question<'a> {
+    /// The request in the frame of `patch`.
+    pub(crate) fn new(prepared: &'a PreparedScene, request: &'a Request, body: &'a Body, patch: CutOrGrid<'a>) -> Self {
+        let frame = patch.patch().scene_from_patch;
         let patch_from_needle = frame.inverse() * request.needle.scene_from_needle();
         let motion = match request.control {
             Control::Force(force) => Motion {
@@ -153,31 +177,27 @@ impl PreparedScene {
                 Motion { direction: patch_from_needle.rotation * -Vector3::z_axis(), force_mn: None, travel_mm: 0.0 }
             }
         };
-        Ok(Question { prepared: self, request, patch, tool: Tool { body, patch_from_needle }, motion })
+        Question { prepared, request, patch, tool: Tool { body, patch_from_needle }, motion }
     }
 }
 
-/// A grid's patch is the scene's, a cut one the request's own.
-enum CutOrGrid<'a> {
-    Grid(&'a Patch),
-    Cut(Box<Patch>),
-}
-
-/// A request in the patch frame.
-struct Question<'a> {
-    prepared: &'a PreparedScene,
-    request: &'a Request,
-    patch: CutOrGrid<'a>,
-    tool: Tool<'a>,
-    motion: Motion,
-}
-
 impl Question<'_> {
-    fn patch(&self) -> &Patch {
-        match &self.patch {
-            CutOrGrid::Grid(patch) => patch,
-            CutOrGrid::Cut(patch) => patch,
+    pub(crate) fn patch(&self) -> &Patch {
+        self.patch.patch()
+    }
+
+    /// The linear answer inside the limits of the tissue model; `None` where the needle does not reach the surface.
+    pub(crate) fn pressed(&self) -> Result<Option<LinearAnswer<'_>>, PredictError> {
+        let press = press(self.patch(), &self.tool, &self.motion)?;
+        self.check_pressure(&press)?;
+        if matches!(press.load, Load::Depth(depth) if depth <= 0.0) {
+            return Ok(None);
         }
+        let tip = self.request.needle.shape.tip;
+        let linear =
+            LinearAnswer::new(&self.prepared.beds, self.patch(), &self.tool, tip, press, &self.motion.direction)?;
+        self.check_depth(&linear)?;
+        Ok(Some(linear))
     }
 
     fn answer(
@@ -191,22 +211,10 @@ impl Question<'_> {
             let decision = decide(&self.request.effects, self.request.level, still)?;
             return Ok(self.at_rest(decision, "no force is applied"));
         }
-        let press = press(self.patch(), &self.tool, &self.motion)?;
-        self.check_pressure(&press)?;
-        let closed = !matches!(press.load, Load::Depth(depth) if depth <= 0.0);
-        if !closed {
+        let Some(linear) = self.pressed()? else {
             let decision = decide(&self.request.effects, self.request.level, still)?;
             return Ok(self.at_rest(decision, "the needle does not reach the surface"));
-        }
-        let linear = LinearAnswer::new(
-            &self.prepared.beds,
-            self.patch(),
-            &self.tool,
-            self.request.needle.shape.tip,
-            press,
-            &self.motion.direction,
-        )?;
-        self.check_depth(&linear)?;
+        };
         let strain = linear.depth_mm / self.yielding_mm();
         let decision =
             decide(&self.request.effects, self.request.level, Expected { depth_mm: linear.depth_mm, strain })?;
@@ -222,7 +230,7 @@ impl Question<'_> {
     }
 
     /// Adds to the reported penetration that of the patch's own nodes: a coarse face may cut a sharp edge between its quadrature points.
-    fn with_node_penetration(&self, mut answer: FiniteElementAnswer) -> FiniteElementAnswer {
+    pub(crate) fn with_node_penetration(&self, mut answer: FiniteElementAnswer) -> FiniteElementAnswer {
         let mut pose = self.tool.patch_from_needle;
         pose.translation.vector += self.motion.direction.into_inner() * answer.travel_mm;
         let penetration = |(vertex, moved): (&Point3<f64>, &Vector3<f64>)| {
@@ -234,7 +242,7 @@ impl Question<'_> {
     }
 
     /// Thickness of retina and choroid (mm).
-    fn yielding_mm(&self) -> f64 {
+    pub(crate) fn yielding_mm(&self) -> f64 {
         let tissue = &self.prepared.scene.tissue;
         tissue.retina_thickness_mm() + tissue.choroid.thickness_mm
     }
@@ -282,7 +290,7 @@ impl Question<'_> {
         }
     }
 
-    fn estimate(&self, linear: &LinearAnswer) -> ContactEstimate {
+    pub(crate) fn estimate(&self, linear: &LinearAnswer) -> ContactEstimate {
         ContactEstimate {
             center: linear.center,
             radius_mm: linear.contact_radius_mm,
@@ -292,7 +300,7 @@ impl Question<'_> {
     }
 
     /// Linear surface displacement, fading with depth as the layers share a uniform pressure.
-    fn start<'b>(&self, linear: &'b LinearAnswer) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
+    pub(crate) fn start<'b>(&self, linear: &'b LinearAnswer) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
         let layers = self.prepared.scene.tissue.layers();
         let compliance: Vec<f64> =
             layers.iter().map(|named| named.layer.thickness_mm / named.layer.youngs_modulus_kpa).collect();
@@ -307,7 +315,7 @@ impl Question<'_> {
         }
     }
 
-    fn problem(&self, decision: &Decision) -> Problem<'_> {
+    pub(crate) fn problem(&self, decision: &Decision) -> Problem<'_> {
         Problem {
             patch: self.patch(),
             tissue: &self.prepared.scene.tissue,
@@ -317,7 +325,7 @@ impl Question<'_> {
         }
     }
 
-    fn coarse(
+    pub(crate) fn coarse(
         &self,
         linear: &LinearAnswer,
         decision: &Decision,
@@ -364,8 +372,8 @@ impl Question<'_> {
         Ok(answer)
     }
 
-    fn at_rest(&self, mut decision: Decision, reason: &str) -> Prediction {
-        if let Some(contact) = decision.reports.last_mut() {
+    pub(crate) fn at_rest(&self, mut decision: Decision, reason: &str) -> Prediction {
+        if let Some(contact) = decision.reports.iter_mut().find(|report| report.name == contact::NAME) {
             contact.simulated = false;
             contact.reason = reason.to_owned();
         }
@@ -387,7 +395,7 @@ impl Question<'_> {
     }
 
     /// The answer in scene coordinates.
-    fn prediction(&self, answer: FiniteElementAnswer, decision: Decision) -> Prediction {
+    pub(crate) fn prediction(&self, answer: FiniteElementAnswer, decision: Decision) -> Prediction {
         let patch = self.patch();
         let deformed: Vec<Point3<f64>> =
             patch.vertices.iter().zip(&answer.displacements).map(|(vertex, moved)| vertex + moved).collect();

@@ -1,7 +1,7 @@
 //! The service: needle pose and force in, deformed retina surface and normals out, over HTTP or from a file.
 //!
 //! Read in this order: `routes` (every URL), `handlers`, [`wire`] (every message), `understand` (from the wire to the core),
-//! `answer` (one request from bytes to bytes), `pool` and `scenes` (where it runs and what is kept). [`config`] is what the
+//! `answer` (one request from bytes to bytes), `simulate` (one sequence, line by line), `pool` and `scenes` (where it runs and what is kept). [`config`] is what the
 //! program can be told, [`problem`] how it says no.
 //!
 //! Not here: numerics, which are `retina_core`'s; this crate only brings questions to it and answers back.
@@ -18,6 +18,7 @@ mod read;
 mod routes;
 mod run;
 pub mod scenes;
+mod simulate;
 mod state;
 mod stopwatch;
 mod understand;

@@ -11,7 +11,7 @@ use retina_core::needle::shape::RADIUS;
 use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::{Control, EffectChoice, Level, Request, Workspace};
 use retina_core::scene::Scene;
-use tokio::sync::Semaphore;
+use tokio::sync::{Semaphore, mpsc};
 
 use crate::answer::{answer, predict};
 use crate::body::{self, LARGE_AT_ONCE};
@@ -19,6 +19,7 @@ use crate::config::Config;
 use crate::pool::{Pool, PoolError};
 use crate::problem::{Kind, Problem};
 use crate::scenes::Scenes;
+use crate::simulate::{FIRST_AND_LAST, Limits, Lines, simulate};
 use crate::stopwatch::Stopwatch;
 use crate::wire::request::SceneChoice;
 use crate::write::Layout;
@@ -39,6 +40,8 @@ pub struct App {
     large_bodies: Arc<Semaphore>,
     warm_up: Arc<OnceLock<Result<(), Problem>>>,
     time_limit: Duration,
+    simulations: Arc<Semaphore>,
+    simulation_limits: Limits,
 }
 
 impl App {
@@ -67,6 +70,9 @@ impl App {
             scenes,
             warm_up,
             time_limit,
+            // One thread stays for predictions, where there are several.
+            simulations: Arc::new(Semaphore::new(config.threads().saturating_sub(1).max(1))),
+            simulation_limits: Limits { steps: config.simulation_steps.into(), time: config.simulation_time_limit() },
         }))
     }
 
@@ -82,14 +88,34 @@ impl App {
             let mut stopwatch = Stopwatch::start(accepted, limit, abandoned);
             answer(body.as_ref(), &scenes, workspace, &mut stopwatch)
         };
-        self.pool.run(job).await.unwrap_or_else(|error| {
-            Err(match error {
-                PoolError::Full => {
-                    Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
-                }
-                PoolError::Panicked => Problem::internal(error),
-            })
-        })
+        self.pool.run(job).await.unwrap_or_else(|error| Err(from_pool(error)))
+    }
+
+    /// Simulates the sequence whose body is on its way: the lines of the answer, each as soon as it is there. The work ends when the
+    /// answer is dropped.
+    ///
+    /// # Errors
+    /// The problem of a sequence that does not begin.
+    pub async fn simulate(&self, headers: &HeaderMap, body: Body) -> Result<Body, Problem> {
+        let body = body::json(headers, body, &self.large_bodies).await?;
+        let permit = Arc::clone(&self.simulations).try_acquire_owned().map_err(|_| {
+            Problem::new(
+                Kind::Busy,
+                "As many simulations as the service has threads for are at work; try again in a second.",
+            )
+        })?;
+        let accepted = Instant::now();
+        let (scenes, limits) = (Arc::clone(&self.scenes), self.simulation_limits);
+        // Room for every line: a client that reads slowly does not hold a thread.
+        let (sender, lines) = mpsc::channel(limits.steps + FIRST_AND_LAST);
+        let job = move |_: &mut Workspace| {
+            let gone = || sender.is_closed();
+            let mut stopwatch = Stopwatch::start(accepted, limits.time, &gone);
+            // A line that finds no room has lost its reader.
+            simulate(body.as_ref(), &scenes, limits.steps, &mut stopwatch, &mut |line| sender.try_send(line).is_ok());
+        };
+        self.pool.begin(job).map_err(from_pool)?;
+        Lines::new(lines, permit).body().await
     }
 
     /// Whether every built-in scene has answered at the levels that a simulator uses.
@@ -105,6 +131,15 @@ impl App {
             )),
             None => Err(Problem::new(Kind::NotReady, "The built-in scenes are being prepared.")),
         }
+    }
+}
+
+fn from_pool(error: PoolError) -> Problem {
+    match error {
+        PoolError::Full => {
+            Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
+        }
+        PoolError::Panicked => Problem::internal(error),
     }
 }
 
