@@ -4,10 +4,12 @@
 //! effect that remembers (`viscoelasticity`, `inertia`) every step is an equilibrium of its own, and the step before is only its
 //! start; with one, [`Simulation`] carries what is remembered from step to step.
 //!
-//! Where the mesh stands: it is laid around the largest contact that linear elasticity expects of the steps ahead as far as one mesh fits them all.
-//! Where a contact no longer fits it (`plan`), a scene without memory gets a new mesh and a fresh linear start, and the step says so. What tissue remembers
-//! lives in its elements, so a scene with memory keeps one mesh from first to last, and a step whose contact has left the fine zone carries
-//! a warning that says by how much.
+//! Where the mesh stands: a mesh as coarse as `coarse` answers well only for the contact that it was made for (a contact of half the radius is off by a
+//! third of its motion). So without memory a step keeps the mesh, and starts from the step before, while its expected contact stays within
+//! two hundredths of a radius of the one that the mesh was laid around, as in a stream at haptic rate; else it gets a mesh of its own and a fresh linear
+//! start, and says so. What tissue remembers lives in its elements: with memory one mesh lasts from first to last. It is laid around
+//! all expected contacts, level `coarse` divides it more finely ([`LASTING`]), and a step whose contact leaves its fine zone carries a
+//! warning that says by how much.
 //!
 //! Read on in `plan` (every step checked before the first is computed), `rates` (which effects that remember are called for), `history` (what they
 //! remember), `advance` (one step). Not here: clocks, threads, the wire.
@@ -45,6 +47,10 @@ pub const TIME_STEP: ParameterRange = ParameterRange {
     max: 1e3,
     source: "bound of this program: a thousandth of the tissue's slowest period to ten times its longest relaxation time",
 };
+
+/// Level `coarse` on a mesh that lasts: over contacts of a third to the whole of the radius that it was laid around it is nearer to `reference` than
+/// `coarse` is on a mesh made for each (measured), at two to three times the cost.
+pub const LASTING: Resolution = Resolution { core_cells: 2, core_per_contact: 1.0, ..COARSE };
 
 /// One step. What is left out stays as the step before left it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -127,6 +133,8 @@ pub struct StepOutcome {
 struct Laid {
     contact: ContactEstimate,
     size: MeshSize,
+    /// What every step's caller should know of it.
+    warning: Option<String>,
 }
 
 /// Where a step ended, on the mesh that is laid.
@@ -149,7 +157,7 @@ pub struct Simulation<'a> {
     plan: Plan,
     decision: Decision,
     rates: Rates,
-    resolution: &'static Resolution,
+    resolution: &'a Resolution,
     topology: Arc<WallTopology>,
     solver: newton::Workspace,
     coarse: predict::Workspace,
@@ -171,16 +179,32 @@ impl<'a> Simulation<'a> {
         sequence: &'a Sequence,
         progress: &mut dyn Progress,
     ) -> Result<Self, SequenceError> {
-        let resolution = match sequence.level {
-            Level::Linear => return Err(SequenceError::Level { level: sequence.level.name() }),
-            Level::Coarse => &COARSE,
-            Level::Reference => &REFERENCE,
-        };
+        Self::at(prepared, sequence, None, progress)
+    }
+
+    /// As [`Simulation::new`], with `resolution` in place of the level's: for measuring what refinement changes.
+    ///
+    /// # Errors
+    /// [`SequenceError`], naming the step at fault.
+    pub fn at(
+        prepared: &'a PreparedScene,
+        sequence: &'a Sequence,
+        resolution: Option<&'a Resolution>,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, SequenceError> {
+        if sequence.level == Level::Linear {
+            return Err(SequenceError::Level { level: sequence.level.name() });
+        }
         progress.stage("plan");
         let body = sequence.needle.shape.body();
         let (patch, plan) = plan::plan(prepared, sequence, &body, progress)?;
         let first = |cause| SequenceError::At { step: 0, time_s: sequence.steps[0].time_s, cause };
         let (decision, rates) = rates::decide(prepared, sequence, &plan).map_err(first)?;
+        let resolution = resolution.unwrap_or(match sequence.level {
+            Level::Reference => &REFERENCE,
+            _ if rates.any() => &LASTING,
+            _ => &COARSE,
+        });
         let topology = shared_topology(resolution.division(&prepared.scene().tissue))
             .map_err(|error| first(PredictError::Mesh(error)))?;
         let solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);

@@ -12,4 +12,5 @@ mod program;
 mod properties;
 mod refusals;
 mod schema;
+mod sequences;
 mod sockets;

@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::history::History;
-use super::plan::{misfit, pressed};
+use super::plan::{fits, outside, pressed};
 use super::{Laid, Settled, Simulation, Step};
 use crate::equilibrium::{Load, MeshSize, Motion};
 use crate::predict::finite_element::{ContactEstimate, Problem};
@@ -24,7 +24,7 @@ struct Aim {
     /// Whether it was laid for this step.
     laid: bool,
     /// What the caller should know of it.
-    warning: Option<String>,
+    warnings: Vec<String>,
 }
 
 impl Simulation<'_> {
@@ -67,30 +67,29 @@ impl Simulation<'_> {
     ) -> Result<Aim, PredictError> {
         let contact = linear.map(|linear| question.estimate(linear));
         let remembers = self.rates.any();
-        let unfit = |mesh: &ContactEstimate| contact.as_ref().and_then(|contact| misfit(mesh, contact));
-        let kept = self.laid.clone().filter(|laid| remembers || unfit(&laid.contact).is_none());
+        let fitting = |mesh: &ContactEstimate| contact.as_ref().is_none_or(|contact| fits(mesh, contact));
+        let kept = self.laid.clone().filter(|laid| remembers || fitting(&laid.contact));
         let laid = match &kept {
             Some(laid) => laid.clone(),
             None => {
-                let planned = if remembers { self.plan.middle() } else { self.plan.aim(self.next) };
-                // A step whose contact turned out other than planned gets a mesh of its own.
-                let planned = planned.filter(|mesh| remembers || unfit(mesh).is_none());
-                let mut around = planned.or(contact).unwrap_or(NO_CONTACT);
-                if let (Level::Reference, Some(linear)) = (question.request.level, linear) {
+                let (mut around, warning) = match remembers {
+                    true => self.plan.middle().unwrap_or((NO_CONTACT, None)),
+                    // A step whose contact turned out other than planned gets a mesh of its own.
+                    false => (self.plan.aim(self.next).filter(fitting).or(contact).unwrap_or(NO_CONTACT), None),
+                };
+                if let (Level::Reference, Some(linear)) = (question.request.level, linear.filter(|_| !remembers)) {
                     // The finer mesh is made for the contact that `coarse` finds, as in a single prediction.
-                    if contact == Some(around) {
-                        let found = question.coarse(linear, &self.decision, &mut self.coarse, progress)?.estimate;
-                        around = ContactEstimate { center: found.center, radius_mm: found.radius_mm, ..around };
-                    }
+                    let found = question.coarse(linear, &self.decision, &mut self.coarse, progress)?.estimate;
+                    around = ContactEstimate { center: found.center, radius_mm: found.radius_mm, ..around };
                 }
                 self.settled = None;
-                Laid { contact: around, size: problem.mesh(self.resolution, &around) }
+                Laid { contact: around, size: problem.mesh(self.resolution, &around), warning }
             }
         };
-        let warning =
-            unfit(&laid.contact).filter(|_| remembers).map(|why| format!("{why}: the surface is less accurate there"));
         self.laid = Some(laid.clone());
-        Ok(Aim { contact, size: laid.size, laid: kept.is_none(), warning })
+        let left = contact.as_ref().filter(|_| remembers).and_then(|contact| outside(&laid.contact, contact));
+        let warnings = laid.warning.into_iter().chain(left).collect();
+        Ok(Aim { contact, size: laid.size, laid: kept.is_none(), warnings })
     }
 
     fn solve(
@@ -146,7 +145,7 @@ impl Simulation<'_> {
         }
         self.settled = Some(Settled { positions: equilibrium.positions, expected, pressed: linear.is_some() });
         let mut prediction = question.prediction(answer, self.decision.clone());
-        prediction.warnings.extend(aim.warning);
+        prediction.warnings.extend(aim.warnings);
         Ok((prediction, aim.laid))
     }
 

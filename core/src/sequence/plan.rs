@@ -24,12 +24,13 @@ pub(super) struct Plan {
     pub fastest_change_s: f64,
 }
 
-/// Largest distance of a contact's centre from the mesh's, in radii of the contact that the mesh was laid around: within the core.
-const LARGEST_OFFSET: f64 = 0.5;
-/// Smallest contact that the mesh still resolves, in the same radii.
-const SMALLEST_RADIUS: f64 = 0.4;
-/// Largest contact that the mesh's fine zone still holds, in the same radii.
-const LARGEST_RADIUS: f64 = 1.25;
+/// Largest distance of a contact's centre from the mesh's, and largest difference of their radii, in radii of the contact that the mesh was
+/// laid around. On a mesh as coarse as `coarse` a contact that is off by more moves nodes by more than that level's own error (measured).
+const LARGEST_MISFIT: f64 = 0.02;
+/// How far a contact may reach from the middle of a lasting mesh, in radii of its fine zone.
+const LARGEST_REACH: f64 = 1.25;
+/// Fine zone of a lasting mesh, in radii of the largest contact, from which on its elements are coarse for every contact.
+const WIDEST_ZONE: f64 = 2.0;
 
 impl Plan {
     /// The contact to lay a mesh around for step `from` and as many after it as that mesh fits: the largest of theirs.
@@ -37,9 +38,10 @@ impl Plan {
         let mut held: Vec<ContactEstimate> = Vec::new();
         let mut aim: Option<ContactEstimate> = None;
         for contact in self.contacts[from..].iter().flatten() {
+            // The first one that is not fitted ends the run: what follows gets a mesh of its own.
             let wider = aim.filter(|aim| aim.radius_mm >= contact.radius_mm).unwrap_or(*contact);
             held.push(*contact);
-            if !held.iter().all(|contact| misfit(&wider, contact).is_none()) {
+            if !held.iter().all(|contact| fits(&wider, contact)) {
                 break;
             }
             aim = Some(wider);
@@ -47,8 +49,9 @@ impl Plan {
         aim
     }
 
-    /// The contact to lay one mesh around for all steps: the middle of all contacts, with the radius of the largest.
-    pub fn middle(&self) -> Option<ContactEstimate> {
+    /// The contact to lay one mesh around for all steps: in the middle of all contacts, and as wide as all together. What the caller should know
+    /// of such a mesh.
+    pub fn middle(&self) -> Option<(ContactEstimate, Option<String>)> {
         let contacts = || self.contacts.iter().flatten();
         let largest = contacts().copied().reduce(|a, b| if b.radius_mm > a.radius_mm { b } else { a })?;
         let center = [0, 1].map(|k| {
@@ -57,25 +60,39 @@ impl Plan {
             });
             0.5 * (low + high)
         });
-        Some(ContactEstimate { center, ..largest })
+        let middle = ContactEstimate { center, ..largest };
+        let radius_mm = contacts().map(|contact| reach_mm(&middle, contact)).fold(0.0, f64::max);
+        let warning = (radius_mm > WIDEST_ZONE * largest.radius_mm).then(|| {
+            format!(
+                "the contacts wander over {radius_mm:.3} mm around the middle of the mesh, which is coarse for contacts of {:.3} mm radius",
+                largest.radius_mm
+            )
+        });
+        Some((ContactEstimate { radius_mm, ..middle }, warning))
     }
 }
 
-/// Why a mesh laid around `mesh` does not fit `contact`, in words; `None` if it does.
-pub(super) fn misfit(mesh: &ContactEstimate, contact: &ContactEstimate) -> Option<String> {
-    let offset_mm = (contact.center[0] - mesh.center[0]).hypot(contact.center[1] - mesh.center[1]);
-    let (radius_mm, around_mm) = (contact.radius_mm, mesh.radius_mm);
-    if offset_mm > LARGEST_OFFSET * around_mm {
-        let allowed = LARGEST_OFFSET * around_mm;
-        return Some(format!(
-            "the contact is {offset_mm:.3} mm from the middle of the mesh, more than {allowed:.3} mm"
-        ));
-    }
-    if radius_mm < SMALLEST_RADIUS * around_mm || radius_mm > LARGEST_RADIUS * around_mm {
-        let (low, high) = (SMALLEST_RADIUS * around_mm, LARGEST_RADIUS * around_mm);
-        return Some(format!("the contact's radius is {radius_mm:.3} mm, outside of {low:.3} to {high:.3} mm"));
-    }
-    None
+fn offset_mm(mesh: &ContactEstimate, contact: &ContactEstimate) -> f64 {
+    (contact.center[0] - mesh.center[0]).hypot(contact.center[1] - mesh.center[1])
+}
+
+/// How far a contact reaches from the middle of a mesh (mm).
+fn reach_mm(mesh: &ContactEstimate, contact: &ContactEstimate) -> f64 {
+    offset_mm(mesh, contact) + contact.radius_mm
+}
+
+/// Whether a mesh laid around `mesh` resolves `contact` as well as one of its own would.
+pub(super) fn fits(mesh: &ContactEstimate, contact: &ContactEstimate) -> bool {
+    let allowed_mm = LARGEST_MISFIT * mesh.radius_mm;
+    offset_mm(mesh, contact) <= allowed_mm && (contact.radius_mm - mesh.radius_mm).abs() <= allowed_mm
+}
+
+/// What the caller should know of `contact` on a lasting mesh laid around `mesh`: that it has left the fine zone.
+pub(super) fn outside(mesh: &ContactEstimate, contact: &ContactEstimate) -> Option<String> {
+    let (reach_mm, zone_mm) = (reach_mm(mesh, contact), LARGEST_REACH * mesh.radius_mm);
+    (reach_mm > zone_mm).then(|| {
+        format!("the contact reaches {reach_mm:.3} mm from the middle of the mesh, beyond its fine zone of {zone_mm:.3} mm: the surface is less accurate there")
+    })
 }
 
 impl Sequence {
