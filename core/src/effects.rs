@@ -3,7 +3,10 @@
 pub mod contact;
 pub mod elasticity;
 pub mod finite_strain;
+pub mod inertia;
 pub mod solid;
+pub mod viscoelasticity;
 
 /// Names of every effect, in the order in which reports list them.
-pub const EFFECT_NAMES: [&str; 3] = [elasticity::NAME, finite_strain::NAME, contact::NAME];
+pub const EFFECT_NAMES: [&str; 5] =
+    [elasticity::NAME, finite_strain::NAME, contact::NAME, viscoelasticity::NAME, inertia::NAME];

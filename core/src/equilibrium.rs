@@ -168,7 +168,7 @@ const ATTEMPTS: [Attempt; 4] = [
     Attempt { load_steps: 12, globalization: Globalization::LineSearch, max_iterations: 100 },
 ];
 /// Iterations of all attempts together: what takes more is a sharp edge that cuts its way in, where no load path of this model ends.
-const MOST_ITERATIONS: usize = 200;
+const MOST_ITERATIONS: usize = 120;
 /// Iterations in which the needle waits for the tissue.
 const HELD_ITERATIONS: usize = 1;
 /// Share of the remaining way by which the needle overlaps the tissue at the start of load steps.
@@ -217,6 +217,11 @@ impl<'a> Wall<'a> {
     /// The mesh's topology.
     pub fn topology(&self) -> &WallTopology {
         self.topology
+    }
+
+    /// The inner surface's faces at rest.
+    pub fn faces(&self) -> &ContactFaces {
+        &self.faces
     }
 
     /// Rest positions with the needle's tip at its given pose.

@@ -17,6 +17,7 @@ pub mod predict;
 pub mod progress;
 pub mod range;
 pub mod scene;
+pub mod sequence;
 pub mod solve;
 pub mod surface;
 pub mod tissue;

@@ -11,7 +11,7 @@ pub mod choice;
 pub mod expected_error;
 pub mod finite_element;
 pub mod linear;
-mod topologies;
+pub(crate) mod topologies;
 pub mod types;
 
 pub use types::*;
@@ -20,6 +20,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Unit, Vector3};
 
+use crate::effects::contact;
 use crate::equilibrium::{Motion, Tool};
 use crate::mesh::wall::WallTopology;
 use crate::needle::Body;
@@ -134,44 +135,67 @@ impl PreparedScene {
         let question = self.aimed(request, &body)?;
         Ok(match question.begin()? {
             Begun::Still(_) => question.situation(0.0, 0.0, None),
-            Begun::Pressed(linear) => question.pressed(&linear),
+            Begun::Pressed(linear) => question.situation_under(&linear),
         })
     }
 
     /// The request in the frame of the patch where the needle touches.
     fn aimed<'a>(&'a self, request: &'a Request, body: &'a Body) -> Result<Question<'a>, PredictError> {
         request.needle.validate()?;
-        let first = self.question(request, body, &request.needle.tip_mm)?;
-        match self.scene.surface {
-            // The patch is the nodes nearest to the contact: cut again where the needle touches.
-            SceneSurface::Mesh(_) => match press(first.patch(), &first.tool, &first.motion) {
-                Ok(press) => {
-                    let [x, y] = press.touch.parameter;
-                    let touch = first.patch().surface.column(x, y).surface;
-                    let touch_in_scene = first.patch().scene_from_patch * touch;
-                    self.question(request, body, &touch_in_scene)
-                }
-                Err(_) => Ok(first),
-            },
-            _ => Ok(first),
-        }
+        Ok(Question::new(self, request, body, self.patch_for(request, body)?))
     }
 
-    /// The request in the frame of the patch around `contact`.
-    fn question<'a>(
-        &'a self,
-        request: &'a Request,
-        body: &'a Body,
-        contact: &Point3<f64>,
-    ) -> Result<Question<'a>, PredictError> {
-        let patch = match &self.patch {
+    /// The patch of a request: the scene's own, or the nodes of its mesh nearest to where the needle touches.
+    pub(crate) fn patch_for(&self, request: &Request, body: &Body) -> Result<CutOrGrid<'_>, PredictError> {
+        if let Some(patch) = &self.patch {
+            return Ok(CutOrGrid::Grid(patch));
+        }
+        let tip = request.needle.tip_mm;
+        let first = Question::new(self, request, body, self.patch_around(&tip)?);
+        let around = press(first.patch(), &first.tool, &first.motion).map(|press| {
+            let [x, y] = press.touch.parameter;
+            first.patch().scene_from_patch * first.patch().surface.column(x, y).surface
+        });
+        self.patch_around(&around.unwrap_or(tip))
+    }
+
+    /// The patch of a contact (scene coordinates).
+    fn patch_around(&self, contact: &Point3<f64>) -> Result<CutOrGrid<'_>, PredictError> {
+        Ok(match &self.patch {
             Some(patch) => CutOrGrid::Grid(patch),
             None => CutOrGrid::Cut(Box::new(self.scene.patch(contact)?)),
-        };
-        let frame = match &patch {
-            CutOrGrid::Grid(patch) => patch.scene_from_patch,
-            CutOrGrid::Cut(patch) => patch.scene_from_patch,
-        };
+        })
+    }
+}
+
+/// A grid's patch is the scene's, a cut one the request's own.
+pub(crate) enum CutOrGrid<'a> {
+    Grid(&'a Patch),
+    Cut(Box<Patch>),
+}
+
+impl CutOrGrid<'_> {
+    pub(crate) fn patch(&self) -> &Patch {
+        match self {
+            CutOrGrid::Grid(patch) => patch,
+            CutOrGrid::Cut(patch) => patch,
+        }
+    }
+}
+
+/// A request in the patch frame.
+pub(crate) struct Question<'a> {
+    pub(crate) prepared: &'a PreparedScene,
+    pub(crate) request: &'a Request,
+    patch: CutOrGrid<'a>,
+    pub(crate) tool: Tool<'a>,
+    pub(crate) motion: Motion,
+}
+
+impl<'a> Question<'a> {
+    /// The request in the frame of `patch`.
+    pub(crate) fn new(prepared: &'a PreparedScene, request: &'a Request, body: &'a Body, patch: CutOrGrid<'a>) -> Self {
+        let frame = patch.patch().scene_from_patch;
         let patch_from_needle = frame.inverse() * request.needle.scene_from_needle();
         let motion = match request.control {
             Control::Force(force) => Motion {
@@ -183,14 +207,8 @@ impl PreparedScene {
                 Motion { direction: patch_from_needle.rotation * -Vector3::z_axis(), force_mn: None, travel_mm: 0.0 }
             }
         };
-        Ok(Question { prepared: self, request, patch, tool: Tool { body, patch_from_needle }, motion })
+        Question { prepared, request, patch, tool: Tool { body, patch_from_needle }, motion }
     }
-}
-
-/// A grid's patch is the scene's, a cut one the request's own.
-enum CutOrGrid<'a> {
-    Grid(&'a Patch),
-    Cut(Box<Patch>),
 }
 
 /// What a request comes to before any level computes it.
@@ -201,21 +219,23 @@ enum Begun<'a> {
     Pressed(LinearAnswer<'a>),
 }
 
-/// A request in the patch frame.
-struct Question<'a> {
-    prepared: &'a PreparedScene,
-    request: &'a Request,
-    patch: CutOrGrid<'a>,
-    tool: Tool<'a>,
-    motion: Motion,
-}
-
 impl Question<'_> {
-    fn patch(&self) -> &Patch {
-        match &self.patch {
-            CutOrGrid::Grid(patch) => patch,
-            CutOrGrid::Cut(patch) => patch,
+    pub(crate) fn patch(&self) -> &Patch {
+        self.patch.patch()
+    }
+
+    /// The linear answer inside the limits of the tissue model; `None` where the needle does not reach the surface.
+    pub(crate) fn pressed(&self) -> Result<Option<LinearAnswer<'_>>, PredictError> {
+        let press = press(self.patch(), &self.tool, &self.motion)?;
+        self.check_pressure(&press)?;
+        if matches!(press.load, Load::Depth(depth) if depth <= 0.0) {
+            return Ok(None);
         }
+        let tip = self.request.needle.shape.tip;
+        let linear =
+            LinearAnswer::new(&self.prepared.beds, self.patch(), &self.tool, tip, press, &self.motion.direction)?;
+        self.check_depth(&linear)?;
+        Ok(Some(linear))
     }
 
     fn answer(
@@ -243,7 +263,7 @@ impl Question<'_> {
             Level::Coarse => self.coarse(&linear, &decision, workspace, progress)?,
             Level::Reference => self.fine(resolution, &linear, &decision, workspace, progress)?,
         };
-        let expected = self.pressed(&linear).expected_error(self.request.level);
+        let expected = self.situation_under(&linear).expected_error(self.request.level);
         Ok(self.prediction(self.with_node_penetration(answer), decision, expected))
     }
 
@@ -252,19 +272,13 @@ impl Question<'_> {
         if self.motion.force_mn == Some(0.0) {
             return Ok(Begun::Still("no force is applied"));
         }
-        let press = press(self.patch(), &self.tool, &self.motion)?;
-        self.check_pressure(&press)?;
-        if matches!(press.load, Load::Depth(depth) if depth <= 0.0) {
-            return Ok(Begun::Still("the needle does not reach the surface"));
-        }
-        let beds = &self.prepared.beds;
-        let tip = self.request.needle.shape.tip;
-        let linear = LinearAnswer::new(beds, self.patch(), &self.tool, tip, press, &self.motion.direction)?;
-        self.check_depth(&linear)?;
-        Ok(Begun::Pressed(linear))
+        Ok(match self.pressed()? {
+            Some(linear) => Begun::Pressed(linear),
+            None => Begun::Still("the needle does not reach the surface"),
+        })
     }
 
-    fn pressed(&self, linear: &LinearAnswer) -> Situation {
+    pub(crate) fn situation_under(&self, linear: &LinearAnswer) -> Situation {
         self.situation(linear.depth_mm, linear.depth_mm / self.yielding_mm(), Some(&linear.press))
     }
 
@@ -275,7 +289,7 @@ impl Question<'_> {
     }
 
     /// Adds to the reported penetration that of the patch's own nodes: a coarse face may cut a sharp edge between its quadrature points.
-    fn with_node_penetration(&self, mut answer: FiniteElementAnswer) -> FiniteElementAnswer {
+    pub(crate) fn with_node_penetration(&self, mut answer: FiniteElementAnswer) -> FiniteElementAnswer {
         let mut pose = self.tool.patch_from_needle;
         pose.translation.vector += self.motion.direction.into_inner() * answer.travel_mm;
         let penetration = |(vertex, moved): (&Point3<f64>, &Vector3<f64>)| {
@@ -287,7 +301,7 @@ impl Question<'_> {
     }
 
     /// Thickness of retina and choroid (mm).
-    fn yielding_mm(&self) -> f64 {
+    pub(crate) fn yielding_mm(&self) -> f64 {
         let tissue = &self.prepared.scene.tissue;
         tissue.retina_thickness_mm() + tissue.choroid.thickness_mm
     }
@@ -335,7 +349,7 @@ impl Question<'_> {
         }
     }
 
-    fn estimate(&self, linear: &LinearAnswer) -> ContactEstimate {
+    pub(crate) fn estimate(&self, linear: &LinearAnswer) -> ContactEstimate {
         ContactEstimate {
             center: linear.center,
             radius_mm: linear.contact_radius_mm,
@@ -345,7 +359,7 @@ impl Question<'_> {
     }
 
     /// Linear surface displacement, fading with depth as the layers share a uniform pressure.
-    fn start<'b>(&self, linear: &'b LinearAnswer) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
+    pub(crate) fn start<'b>(&self, linear: &'b LinearAnswer) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
         let layers = self.prepared.scene.tissue.layers();
         let compliance: Vec<f64> =
             layers.iter().map(|named| named.layer.thickness_mm / named.layer.youngs_modulus_kpa).collect();
@@ -360,7 +374,7 @@ impl Question<'_> {
         }
     }
 
-    fn problem(&self, decision: &Decision) -> Problem<'_> {
+    pub(crate) fn problem(&self, decision: &Decision) -> Problem<'_> {
         Problem {
             patch: self.patch(),
             tissue: &self.prepared.scene.tissue,
@@ -370,7 +384,7 @@ impl Question<'_> {
         }
     }
 
-    fn coarse(
+    pub(crate) fn coarse(
         &self,
         linear: &LinearAnswer,
         decision: &Decision,
@@ -417,8 +431,8 @@ impl Question<'_> {
         Ok(answer)
     }
 
-    fn at_rest(&self, mut decision: Decision, reason: &str) -> Prediction {
-        if let Some(contact) = decision.reports.last_mut() {
+    pub(crate) fn at_rest(&self, mut decision: Decision, reason: &str) -> Prediction {
+        if let Some(contact) = decision.reports.iter_mut().find(|report| report.name == contact::NAME) {
             contact.simulated = false;
             contact.reason = reason.to_owned();
         }
@@ -442,7 +456,12 @@ impl Question<'_> {
     }
 
     /// The answer in scene coordinates.
-    fn prediction(&self, answer: FiniteElementAnswer, decision: Decision, expected: ExpectedError) -> Prediction {
+    pub(crate) fn prediction(
+        &self,
+        answer: FiniteElementAnswer,
+        decision: Decision,
+        expected: ExpectedError,
+    ) -> Prediction {
         let patch = self.patch();
         let deformed: Vec<Point3<f64>> =
             patch.vertices.iter().zip(&answer.displacements).map(|(vertex, moved)| vertex + moved).collect();

@@ -3,13 +3,14 @@
 //! Contract: a [`Tissue`] lists its layers from the vitreous outwards; [`Tissue::validate`] holds every number against the ranges of
 //! [`ranges`]. Units: mm, kPa; Poisson's ratio is a pure number.
 //!
-//! Not here: where the layers lie in space (`surface`), the energy of the material (`effect`), time dependence, adhesion between
-//! layers. Published moduli of the retina span 0.9 to 30 kPa by method, so every number is a scene parameter and none a constant.
+//! Not here: where the layers lie in space (`surface`), the energy of the material (`effect`), adhesion between layers. Published moduli of the retina span 0.9 to 30 kPa by method, so every number is a scene parameter and none a constant.
 
 pub mod ranges;
+pub mod rate;
 
 use crate::range::{OutOfRange, ParameterRange};
 use ranges::LayerRanges;
+use rate::RateProperties;
 
 /// One homogeneous, isotropic elastic layer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,6 +93,8 @@ pub struct Tissue {
     pub choroid: Layer,
     /// Sclera.
     pub sclera: Layer,
+    /// What depends on time.
+    pub rate: RateProperties,
 }
 
 /// Young's moduli of five layers of the rabbit retina in vivo, from the vitreous outwards, kPa (PMC5783626, acoustic radiation
@@ -106,6 +109,7 @@ impl Default for Tissue {
             retina: vec![ranges::RETINA.default_layer()],
             choroid: ranges::CHOROID.default_layer(),
             sclera: ranges::SCLERA.default_layer(),
+            rate: RateProperties::default(),
         }
     }
 }
@@ -153,6 +157,7 @@ impl Tissue {
             };
             layer.validate(&kind.path(), allowed)?;
         }
-        ranges::RETINA.thickness.check("tissue.retina.thickness_mm", self.retina_thickness_mm())
+        ranges::RETINA.thickness.check("tissue.retina.thickness_mm", self.retina_thickness_mm())?;
+        self.rate.validate()
     }
 }

@@ -7,15 +7,19 @@ use retina_core::predict::Level;
 use retina_core::predict::budget::DEFAULT_LEVEL;
 use retina_core::range::ParameterRange;
 use retina_core::scene::{Scene, SceneSurface};
+use retina_core::sequence::TIME_STEP;
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
 use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA};
+use retina_core::tissue::rate::{DENSITY, PronyTerm, RELAXATION_SHARE, RELAXATION_TIME, RateProperties, VITREOUS_DRAG};
 use retina_core::tissue::{Layer, Tissue};
 
 use crate::understand::{DEFAULT_GAUGE, DEFAULT_SCENE, FORCE, MAX_ERROR, MAX_TIME};
 use crate::wire::catalog::{
     GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
 };
-use crate::wire::scene::{LayerSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec};
+use crate::wire::scene::{
+    LayerSpec, PronyTermSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec,
+};
 
 /// The built-in scenes, and every parameter with its range.
 pub fn scenes() -> SceneList {
@@ -98,6 +102,16 @@ fn tissue(tissue: &Tissue) -> TissueSpec {
         retina: Some(retina),
         choroid: Some(layer(&tissue.choroid)),
         sclera: Some(layer(&tissue.sclera)),
+        rate: Some(rate(&tissue.rate)),
+    }
+}
+
+fn rate(rate: &RateProperties) -> RateSpec {
+    let term = |term: &PronyTerm| PronyTermSpec { relaxation_time_s: term.relaxation_time_s, share: term.share };
+    RateSpec {
+        retina_relaxation: Some(rate.retina_relaxation.iter().map(term).collect()),
+        density_kg_per_mm3: Some(rate.density_kg_per_mm3),
+        vitreous_drag_kpa_s_per_mm: Some(rate.vitreous_drag_kpa_s_per_mm),
     }
 }
 
@@ -115,6 +129,11 @@ fn parameters() -> Vec<ParameterEntry> {
         ("scene.surface.depth_mm", &PIT_DEPTH),
         ("scene.surface.sigma_mm", &PIT_SIGMA),
         ("scene.pose.position_mm", &TIP_COORDINATE),
+        ("scene.tissue.rate.retina_relaxation[].relaxation_time_s", &RELAXATION_TIME),
+        ("scene.tissue.rate.retina_relaxation[].share", &RELAXATION_SHARE),
+        ("scene.tissue.rate.density_kg_per_mm3", &DENSITY),
+        ("scene.tissue.rate.vitreous_drag_kpa_s_per_mm", &VITREOUS_DRAG),
+        ("steps[].time_s", &TIME_STEP),
     ];
     let layers = [
         ("inner_limiting_membrane", &INNER_LIMITING_MEMBRANE),

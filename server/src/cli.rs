@@ -1,7 +1,8 @@
-//! The program: serve, answer one request from a file, or review a level.
+//! The program: serve, answer one request from a file, simulate one sequence, or review a level.
 //!
 //! Contract of `predict`: the response goes to standard output and is that of `POST /v1/predict`; a problem goes to standard error as the
-//! same document that HTTP has, and the program ends with 1. The command line is at fault: 2.
+//! same document that HTTP has, and the program ends with 1. The command line is at fault: 2. `simulate` is the same line by line; a
+//! sequence that breaks off has its error as last line and ends with 1.
 
 use std::fs;
 use std::io::{self, IsTerminal as _, Read, Write};
@@ -19,14 +20,15 @@ use tokio_util::sync::CancellationToken;
 use tracing_subscriber::EnvFilter;
 
 use crate::answer::{Question, predict};
-use crate::config::{Command, CommandLine, Config, LogForm, PredictArgs, ReviewArgs};
+use crate::config::{Command, CommandLine, Config, LogForm, PredictArgs, ReviewArgs, SimulateArgs};
 use crate::problem::{Kind, Problem, from_predict};
 use crate::read::read;
 use crate::recording::{self, Recorder, Totals};
+use crate::simulate::{Line, simulate_in};
 use crate::stopwatch::Stopwatch;
 use crate::times::Times;
 use crate::understand;
-use crate::wire::PredictRequest;
+use crate::wire::{PredictRequest, SimulateRequest};
 use crate::write::Layout;
 use crate::{App, page, run};
 
@@ -58,6 +60,13 @@ pub fn main() -> ExitCode {
             }
         }
         Some(Command::Review(args)) => review(&args),
+        Some(Command::Simulate(args)) => {
+            let streams = Streams { input: &mut io::stdin(), output: &mut io::stdout(), problems: &mut io::stderr() };
+            match simulate_file(&args, streams) {
+                Ok(code) => ExitCode::from(code),
+                Err(_) => ExitCode::FAILURE,
+            }
+        }
         Some(Command::Serve(config)) => serve(&config),
         None => serve(&config),
     }
@@ -156,6 +165,45 @@ pub fn predict_file(args: &PredictArgs, streams: Streams) -> io::Result<u8> {
             Ok(1)
         }
     }
+}
+
+/// `retina-server simulate`; returns the exit code.
+///
+/// # Errors
+/// If a stream cannot be written.
+pub fn simulate_file(args: &SimulateArgs, streams: Streams) -> io::Result<u8> {
+    let body = match read_input(&args.request, streams.input) {
+        Ok(body) => body,
+        Err(error) => {
+            writeln!(streams.problems, "{}: {error}", args.request.display())?;
+            return Ok(2);
+        }
+    };
+    let Streams { output, problems, .. } = streams;
+    let mut stopwatch = Stopwatch::start(Instant::now(), Duration::MAX / 4, &|| false);
+    let (mut code, mut written) = (1, Ok(()));
+    let mut tell = |line: Line| {
+        written = match line {
+            Line::Refused(problem) => serde_json::to_writer_pretty(&mut *problems, &problem.document())
+                .map_err(io::Error::from)
+                .and_then(|()| writeln!(problems)),
+            Line::Going(bytes) => output.write_all(&bytes).and_then(|()| output.flush()),
+            Line::Last { bytes, complete } => {
+                code = u8::from(!complete);
+                output.write_all(&bytes)
+            }
+        };
+        written.is_ok()
+    };
+    let scene = |message: &SimulateRequest| {
+        let mut scene = understand::chosen(message.scene.as_ref())?;
+        if let Some(path) = &args.mesh {
+            replace_surface(&mut scene, path)?;
+        }
+        PreparedScene::new(scene).map(Arc::new).map_err(from_predict)
+    };
+    simulate_in(&body, scene, usize::MAX, &mut stopwatch, &mut tell);
+    written.map(|()| code)
 }
 
 fn read_input(path: &Path, input: &mut dyn Read) -> io::Result<Vec<u8>> {

@@ -32,6 +32,8 @@ pub enum Command {
     Predict(PredictArgs),
     /// Compare a level with the ground truth on random requests, for the rerun viewer (cargo feature `rerun`).
     Review(ReviewArgs),
+    /// Simulate a sequence from a file and end: one JSON object a line goes to standard output as it is computed.
+    Simulate(SimulateArgs),
 }
 
 /// How to serve.
@@ -52,6 +54,12 @@ pub struct Config {
     /// Milliseconds after which the work on a request is stopped.
     #[arg(long, env = "RETINA_TIME_LIMIT_MS", default_value_t = 30_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub time_limit_ms: u32,
+    /// Steps that a simulation may have.
+    #[arg(long, env = "RETINA_SIMULATION_STEPS", default_value_t = 2000, value_parser = clap::value_parser!(u16).range(1..))]
+    pub simulation_steps: u16,
+    /// Milliseconds after which a simulation is stopped.
+    #[arg(long, env = "RETINA_SIMULATION_TIME_LIMIT_MS", default_value_t = 300_000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub simulation_time_limit_ms: u32,
     /// Form of the log on standard error. RUST_LOG says what is logged; `retina_server=debug` has a line for each request.
     #[arg(long, env = "RETINA_LOG", default_value = "pretty")]
     pub log: LogForm,
@@ -153,6 +161,16 @@ impl ReviewDestination {
     }
 }
 
+/// One sequence without HTTP.
+#[derive(Debug, Args)]
+pub struct SimulateArgs {
+    /// File with the request that `POST /v1/simulate` takes; `-` is standard input.
+    pub request: PathBuf,
+    /// A mesh in mm (.ply, text or binary, or .obj) in place of the scene's surface.
+    #[arg(long)]
+    pub mesh: Option<PathBuf>,
+}
+
 impl Config {
     /// Where to record what is asked and answered.
     pub fn recording(&self) -> Option<Destination> {
@@ -173,5 +191,10 @@ impl Config {
     /// How long the work on a request may take.
     pub fn time_limit(&self) -> Duration {
         Duration::from_millis(self.time_limit_ms.into())
+    }
+
+    /// How long a simulation may take.
+    pub fn simulation_time_limit(&self) -> Duration {
+        Duration::from_millis(self.simulation_time_limit_ms.into())
     }
 }

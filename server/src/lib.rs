@@ -1,9 +1,9 @@
 //! The service: needle pose and force in, deformed retina surface and normals out, over HTTP or from a file.
 //!
 //! Read in this order: `routes` (every URL), `handlers`, [`wire`] (every message), `understand` (from the wire to the core),
-//! `answer` (one request from bytes to bytes), `pool` and `scenes` (where it runs and what is kept), [`page`] (what a browser
-//! sees). [`config`] is what the program can be told, [`problem`] how it says no. [`recording`] is a guest that looks on, `review`
-//! compares levels for the eye.
+//! `answer` (one request from bytes to bytes), `simulate` (one sequence, line by line), `pool` and `scenes` (where it runs and what
+//! is kept), [`page`] (what a browser sees). [`config`] is what the program can be told, [`problem`] how it says no. [`recording`] is a
+//! guest that looks on, `review` compares levels for the eye.
 //!
 //! Not here: numerics, which are `retina_core`'s; this crate only brings questions to it and answers back.
 
@@ -23,6 +23,7 @@ pub mod review;
 mod routes;
 mod run;
 pub mod scenes;
+mod simulate;
 mod state;
 mod stopwatch;
 mod times;

@@ -33,6 +33,7 @@ struct Description;
 pub fn app(state: AppState) -> Router {
     let (routes, api) = OpenApiRouter::with_openapi(Description::openapi())
         .routes(routes!(handlers::predict))
+        .routes(routes!(handlers::simulate))
         .routes(routes!(handlers::scenes))
         .routes(routes!(handlers::levels))
         .routes(routes!(handlers::gauges))

@@ -12,7 +12,7 @@ use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::budget::Budget;
 use retina_core::predict::{Control, EffectChoice, Level, Request, Workspace};
 use retina_core::scene::Scene;
-use tokio::sync::Semaphore;
+use tokio::sync::{Semaphore, mpsc};
 
 use crate::answer::{Question, answer, predict};
 use crate::body::{self, LARGE_AT_ONCE};
@@ -21,6 +21,7 @@ use crate::pool::{Pool, PoolError};
 use crate::problem::{Kind, Problem};
 use crate::recording::Recorder;
 use crate::scenes::Scenes;
+use crate::simulate::{FIRST_AND_LAST, Limits, Lines, simulate};
 use crate::stopwatch::Stopwatch;
 use crate::times::Times;
 use crate::wire::request::SceneChoice;
@@ -44,6 +45,8 @@ pub struct App {
     times: Arc<Times>,
     time_limit: Duration,
     recorder: Option<Recorder>,
+    simulations: Arc<Semaphore>,
+    simulation_limits: Limits,
 }
 
 impl App {
@@ -83,6 +86,9 @@ impl App {
             times,
             time_limit,
             recorder,
+            // One thread stays for predictions, where there are several.
+            simulations: Arc::new(Semaphore::new(config.threads().saturating_sub(1).max(1))),
+            simulation_limits: Limits { steps: config.simulation_steps.into(), time: config.simulation_time_limit() },
         }))
     }
 
@@ -103,18 +109,37 @@ impl App {
                 None => answer.map(|answer| answer.bytes),
             }
         };
-        self.pool.run(job).await.unwrap_or_else(|error| {
-            let problem = match error {
-                PoolError::Full => {
-                    Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
-                }
-                PoolError::Panicked => Problem::internal(error),
-            };
-            match &self.recorder {
-                Some(recorder) => recorder.record(b"", accepted, Err(problem)),
-                None => Err(problem),
-            }
+        self.pool.run(job).await.unwrap_or_else(|error| match &self.recorder {
+            Some(recorder) => recorder.record(b"", accepted, Err(from_pool(error))),
+            None => Err(from_pool(error)),
         })
+    }
+
+    /// Simulates the sequence whose body is on its way: the lines of the answer, each as soon as it is there. The work ends when the
+    /// answer is dropped.
+    ///
+    /// # Errors
+    /// The problem of a sequence that does not begin.
+    pub async fn simulate(&self, headers: &HeaderMap, body: Body) -> Result<Body, Problem> {
+        let body = body::json(headers, body, &self.large_bodies).await?;
+        let permit = Arc::clone(&self.simulations).try_acquire_owned().map_err(|_| {
+            Problem::new(
+                Kind::Busy,
+                "As many simulations as the service has threads for are at work; try again in a second.",
+            )
+        })?;
+        let accepted = Instant::now();
+        let (scenes, limits) = (Arc::clone(&self.scenes), self.simulation_limits);
+        // Room for every line: a client that reads slowly does not hold a thread.
+        let (sender, lines) = mpsc::channel(limits.steps + FIRST_AND_LAST);
+        let job = move |_: &mut Workspace| {
+            let gone = || sender.is_closed();
+            let mut stopwatch = Stopwatch::start(accepted, limits.time, &gone);
+            // A line that finds no room has lost its reader.
+            simulate(body.as_ref(), &scenes, limits.steps, &mut stopwatch, &mut |line| sender.try_send(line).is_ok());
+        };
+        self.pool.begin(job).map_err(from_pool)?;
+        Lines::new(lines, permit).body().await
     }
 
     /// Whether every built-in scene has answered at the levels that a simulator uses.
@@ -130,6 +155,15 @@ impl App {
             )),
             None => Err(Problem::new(Kind::NotReady, "The built-in scenes are being prepared.")),
         }
+    }
+}
+
+fn from_pool(error: PoolError) -> Problem {
+    match error {
+        PoolError::Full => {
+            Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
+        }
+        PoolError::Panicked => Problem::internal(error),
     }
 }
 

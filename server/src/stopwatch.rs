@@ -33,6 +33,13 @@ impl<'a> Stopwatch<'a> {
         &self.stages
     }
 
+    /// Ends the last stage; gives the stages so far away and goes on with `next`.
+    pub fn take(&mut self, next: &'static str) -> Vec<(&'static str, Duration)> {
+        self.lap();
+        self.current = next;
+        std::mem::take(&mut self.stages)
+    }
+
     /// A stage that comes again adds to its first time.
     fn lap(&mut self) {
         let now = Instant::now();

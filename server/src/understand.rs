@@ -6,6 +6,7 @@
 
 mod needle;
 mod scene;
+mod sequence;
 
 use nalgebra::Vector3;
 use retina_core::effects::EFFECT_NAMES;
@@ -15,6 +16,7 @@ use retina_core::range::ParameterRange;
 use serde_json::json;
 
 pub use scene::{built_in, chosen, scene};
+pub use sequence::sequence;
 
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::Vector;
@@ -75,17 +77,7 @@ pub fn request(request: &PredictRequest) -> Result<Request, Problem> {
 
 fn control(control: ControlName, force_mn: Option<Vector>) -> Result<Control, Problem> {
     match (control, force_mn) {
-        (ControlName::Force, Some(Vector(force_mn))) => {
-            let force = Vector3::from(force_mn);
-            FORCE.check("force_mn", force.norm()).map_err(|error| {
-                let mut problem = from_out_of_range("force_mn".to_owned(), &error);
-                // The caller wrote a vector, so that is what is shown; its length may not even be finite.
-                problem.errors[0].value = Some(json!(force_mn));
-                problem.errors[0].allowed = format!("length {}", problem.errors[0].allowed);
-                problem
-            })?;
-            Ok(Control::Force(force))
-        }
+        (ControlName::Force, Some(force_mn)) => force("force_mn", force_mn).map(Control::Force),
         (ControlName::Force, None) => Err(Problem::field(
             Kind::InvalidRequest,
             "force_mn",
@@ -102,6 +94,19 @@ fn control(control: ControlName, force_mn: Option<Vector>) -> Result<Control, Pr
             "under pose control the needle stays where it is and the force is the answer, so force_mn must be left out",
         )),
     }
+}
+
+/// The force at `field`, not longer than [`FORCE`] allows.
+fn force(field: &str, Vector(force_mn): Vector) -> Result<Vector3<f64>, Problem> {
+    let force = Vector3::from(force_mn);
+    FORCE.check(field, force.norm()).map_err(|error| {
+        let mut problem = from_out_of_range(field.to_owned(), &error);
+        // The caller wrote a vector, so that is what is shown; its length may not even be finite.
+        problem.errors[0].value = Some(json!(force_mn));
+        problem.errors[0].allowed = format!("length {}", problem.errors[0].allowed);
+        problem
+    })?;
+    Ok(force)
 }
 
 /// What the answer must keep.

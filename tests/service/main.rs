@@ -15,4 +15,5 @@ mod properties;
 mod recording;
 mod refusals;
 mod schema;
+mod sequences;
 mod sockets;

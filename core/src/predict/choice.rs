@@ -1,11 +1,14 @@
 //! Which effects a request calls for, and why.
 
 use super::types::{EffectChoice, EffectReport, Level, PredictError};
-use crate::effects::{EFFECT_NAMES, contact, elasticity, finite_strain};
+use crate::effects::{EFFECT_NAMES, contact, elasticity, finite_strain, inertia, viscoelasticity};
 use crate::equilibrium::Solid;
 
 /// Error that `auto` accepts for leaving an effect out (µm): a tenth of the best published tool-to-layer error (9 µm).
 pub const AUTO_TOLERANCE_UM: f64 = 1.0;
+
+/// Why one prediction leaves out what depends on rate: its load lasts.
+const STATIC: &str = "static scene: not called for";
 
 /// The decision.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,6 +86,8 @@ pub fn decide(choice: &EffectChoice, level: Level, expected: Expected) -> Result
             contact,
             if contact { "the needle reaches the surface" } else { "as listed in the request" },
         ),
+        plain(viscoelasticity::NAME, false, STATIC),
+        plain(inertia::NAME, false, STATIC),
     ];
     let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
     Ok(Decision { solid, contact, reports })

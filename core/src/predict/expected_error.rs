@@ -62,6 +62,11 @@ pub struct ExpectedError {
     pub calibrated: bool,
 }
 
+impl ExpectedError {
+    /// Nothing was measured that could say.
+    pub const UNKNOWN: Self = ExpectedError { median_um: f64::INFINITY, p95_um: f64::INFINITY, calibrated: false };
+}
+
 /// The bin of a mean strain.
 pub fn bin(strain: f64) -> usize {
     STRAIN_BINS.iter().filter(|&&end| strain >= end).count()

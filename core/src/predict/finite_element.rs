@@ -6,7 +6,7 @@ use super::types::{ContactReport, ContactState, PredictError, SolverReport};
 use crate::equilibrium::{ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Tool, Wall};
 use crate::mesh::disc::DiscGeometry;
 use crate::mesh::sample::locate;
-use crate::mesh::wall::{WallDivision, WallTopology};
+use crate::mesh::wall::{WallDivision, WallError, WallTopology};
 use crate::patch::Patch;
 use crate::progress::Progress;
 use crate::solve::newton::Workspace;
@@ -136,7 +136,7 @@ pub struct Problem<'a> {
 
 impl Problem<'_> {
     /// The mesh around the estimated contact.
-    fn mesh(&self, resolution: &Resolution, estimate: &ContactEstimate) -> MeshSize {
+    pub(crate) fn mesh(&self, resolution: &Resolution, estimate: &ContactEstimate) -> MeshSize {
         let needle_radius = self.tool.body.radius_mm();
         let contact = estimate.radius_mm.max(SMALLEST_CONTACT * needle_radius);
         let core = resolution.core_per_contact * contact;
@@ -163,9 +163,33 @@ impl Problem<'_> {
     ) -> Result<FiniteElementAnswer, PredictError> {
         progress.stage("mesh");
         let Bench { level, resolution, topology, workspace } = bench;
-        let mesh = self.mesh(resolution, estimate);
-        let wall =
-            Wall::new(topology, &self.patch.surface, self.tissue, &mesh, self.solid, resolution.contact, self.tool)?;
+        let wall = self.wall(topology, resolution, &self.mesh(resolution, estimate))?;
+        let (motion, touch_mm) = self.aimed(&wall, resolution, estimate);
+        let mut positions = wall.displaced(start);
+        wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm));
+        progress.stage("equilibrium");
+        let equilibrium = wall
+            .solve(&Load { motion: &motion, touch_mm, additions: &[] }, positions, workspace, progress)
+            .map_err(|cause| PredictError::Solver { level, cause })?;
+        progress.stage("surface");
+        Ok(self.answer(&wall, &equilibrium, touch_mm))
+    }
+
+    /// The meshed wall under the needle.
+    ///
+    /// # Errors
+    /// If the wall cannot be meshed there.
+    pub(crate) fn wall<'b>(
+        &'b self,
+        topology: &'b WallTopology,
+        resolution: &Resolution,
+        mesh: &MeshSize,
+    ) -> Result<Wall<'b>, WallError> {
+        Wall::new(topology, &self.patch.surface, self.tissue, mesh, self.solid, resolution.contact, self.tool)
+    }
+
+    /// The motion with a guess of its travel on this wall, and the travel at first touch (mm).
+    pub(crate) fn aimed(&self, wall: &Wall, resolution: &Resolution, estimate: &ContactEstimate) -> (Motion, f64) {
         let touch_mm = wall.touch(&self.motion.direction, estimate.touch_mm).unwrap_or(estimate.touch_mm);
         let motion = match self.motion.force_mn {
             Some(force_mn) => {
@@ -177,17 +201,11 @@ impl Problem<'_> {
             }
             None => self.motion,
         };
-        let mut positions = wall.displaced(start);
-        wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm));
-        progress.stage("equilibrium");
-        let equilibrium = wall
-            .solve(&Load { motion: &motion, touch_mm, additions: &[] }, positions, workspace, progress)
-            .map_err(|cause| PredictError::Solver { level, cause })?;
-        progress.stage("surface");
-        Ok(self.answer(&wall, &equilibrium, touch_mm))
+        (motion, touch_mm)
     }
 
-    fn answer(&self, wall: &Wall, equilibrium: &Equilibrium, touch_mm: f64) -> FiniteElementAnswer {
+    /// The equilibrium read off at the patch's nodes.
+    pub(crate) fn answer(&self, wall: &Wall, equilibrium: &Equilibrium, touch_mm: f64) -> FiniteElementAnswer {
         let displacement: Vec<f64> =
             equilibrium.positions.iter().zip(&wall.geometry.rest).map(|(current, rest)| current - rest).collect();
         let node = |&parameter: &[f64; 2]| match locate(wall.topology(), &wall.geometry, parameter) {
