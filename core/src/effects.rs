@@ -3,7 +3,10 @@
 pub mod contact;
 pub mod elasticity;
 pub mod finite_strain;
+pub mod friction;
+pub mod pressure;
 pub mod solid;
 
 /// Names of every effect, in the order in which reports list them.
-pub const EFFECT_NAMES: [&str; 3] = [elasticity::NAME, finite_strain::NAME, contact::NAME];
+pub const EFFECT_NAMES: [&str; 5] =
+    [elasticity::NAME, finite_strain::NAME, contact::NAME, friction::NAME, pressure::NAME];

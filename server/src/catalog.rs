@@ -5,6 +5,7 @@ use retina_core::needle::{GAUGES, TIP_COORDINATE};
 use retina_core::patch::{NODES_PER_SIDE, SPACING_MM};
 use retina_core::predict::Level;
 use retina_core::range::ParameterRange;
+use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
 use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA};
@@ -79,7 +80,14 @@ fn spec(scene: &Scene) -> SceneSpec {
         }
         SceneSurface::Mesh(_) => surface.kind = SurfaceKind::Mesh,
     }
-    SceneSpec { surface: Some(surface), tissue: Some(tissue(&scene.tissue)), pose: None }
+    SceneSpec {
+        surface: Some(surface),
+        tissue: Some(tissue(&scene.tissue)),
+        pose: None,
+        friction_coefficient: Some(scene.friction_coefficient),
+        pressure_kpa: Some(scene.pressure_kpa),
+        rest_pressure_kpa: Some(scene.rest_pressure_kpa),
+    }
 }
 
 fn tissue(tissue: &Tissue) -> TissueSpec {
@@ -112,6 +120,9 @@ fn parameters() -> Vec<ParameterEntry> {
         ("scene.surface.depth_mm", &PIT_DEPTH),
         ("scene.surface.sigma_mm", &PIT_SIGMA),
         ("scene.pose.position_mm", &TIP_COORDINATE),
+        ("scene.friction_coefficient", &FRICTION_COEFFICIENT),
+        ("scene.pressure_kpa", &EYE_PRESSURE),
+        ("scene.rest_pressure_kpa", &EYE_PRESSURE),
     ];
     let layers = [
         ("inner_limiting_membrane", &INNER_LIMITING_MEMBRANE),

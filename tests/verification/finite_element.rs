@@ -3,6 +3,8 @@
 mod block;
 mod closed_forms;
 mod homogeneous;
+mod incline;
+mod inflation;
 mod manufactured;
 mod pressed_needle;
 mod pressed_slab;

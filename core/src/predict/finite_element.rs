@@ -3,10 +3,15 @@
 use nalgebra::{Point3, Vector3};
 
 use super::types::{ContactReport, ContactState, PredictError, SolverReport};
-use crate::equilibrium::{ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Tool, Wall};
+use crate::effects::pressure::Pressure;
+use crate::equilibrium::friction::FrictionError;
+use crate::equilibrium::settled::Settled;
+use crate::equilibrium::{
+    Addition, ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Tool, Wall,
+};
 use crate::mesh::disc::DiscGeometry;
 use crate::mesh::sample::locate;
-use crate::mesh::wall::{WallDivision, WallTopology};
+use crate::mesh::wall::{Place, WallDivision, WallTopology};
 use crate::patch::Patch;
 use crate::progress::Progress;
 use crate::solve::newton::Workspace;
@@ -92,6 +97,8 @@ pub struct ContactEstimate {
 const FIRST_ELEMENT_PER_CONTACT: f64 = 2.0;
 /// Smallest contact radius that a mesh is made for, in needle radii.
 const SMALLEST_CONTACT: f64 = 0.05;
+/// Share of the normal force on slipping tissue above which a contact counts as slipping.
+const SLIPPING_FROM: f64 = 0.5;
 /// The answer of a finite-element level, patch frame.
 pub struct FiniteElementAnswer {
     /// Displacement of each node of the patch (mm).
@@ -132,6 +139,10 @@ pub struct Problem<'a> {
     pub motion: Motion,
     /// Which solid energy.
     pub solid: Solid,
+    /// Coulomb's coefficient, where friction is simulated.
+    pub friction_coefficient: Option<f64>,
+    /// Change of the eye's pressure (kPa), where it is simulated.
+    pub pressure_kpa: Option<f64>,
 }
 
 impl Problem<'_> {
@@ -164,8 +175,15 @@ impl Problem<'_> {
         progress.stage("mesh");
         let Bench { level, resolution, topology, workspace } = bench;
         let mesh = self.mesh(resolution, estimate);
-        let wall =
+        let mut wall =
             Wall::new(topology, &self.patch.surface, self.tissue, &mesh, self.solid, resolution.contact, self.tool)?;
+        let settled = self.pressure_kpa.map(|pressure_kpa| {
+            let yields = |kind| kind != LayerKind::Sclera || resolution.sclera_elements > 0;
+            Settled::new(self.tissue, pressure_kpa, self.solid, yields)
+        });
+        if let Some(settled) = &settled {
+            wall.settle(&self.patch.surface, settled);
+        }
         let touch_mm = wall.touch(&self.motion.direction, estimate.touch_mm).unwrap_or(estimate.touch_mm);
         let motion = match self.motion.force_mn {
             Some(force_mn) => {
@@ -180,19 +198,52 @@ impl Problem<'_> {
         let mut positions = wall.displaced(start);
         wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm));
         progress.stage("equilibrium");
-        let equilibrium = wall
-            .solve(&Load { motion: &motion, touch_mm, additions: &[] }, positions, workspace, progress)
-            .map_err(|cause| PredictError::Solver { level, cause })?;
+        let pressure = self.pressure_kpa.map(|pressure_kpa| Pressure { pressure_kpa });
+        let additions: Vec<Addition> = pressure.iter().map(|effect| Addition { effect, place: Place::Faces }).collect();
+        let load = Load { motion: &motion, touch_mm, additions: &additions };
+        let failed = |cause| PredictError::Solver { level, cause };
+        let (equilibrium, rubbing) = match self.friction_coefficient {
+            None => (wall.solve(&load, positions, workspace, progress).map_err(failed)?, None),
+            Some(coefficient) => {
+                let (equilibrium, rubbing) = wall
+                    .solve_with_friction(&load, coefficient, positions, workspace, progress)
+                    .map_err(|cause| match cause {
+                        FrictionError::Newton(cause) => failed(cause),
+                        cause @ FrictionError::NotSettled { .. } => PredictError::Friction { level, cause },
+                    })?;
+                (equilibrium, Some(rubbing))
+            }
+        };
         progress.stage("surface");
-        Ok(self.answer(&wall, &equilibrium, touch_mm))
+        let beyond = |parameter| settled.as_ref().map_or_else(Vector3::zeros, |settled| self.sunk(settled, parameter));
+        let mut answer = self.answer(&wall, &equilibrium, touch_mm, &beyond);
+        if let Some(rubbing) = rubbing.filter(|_| answer.contact.state == ContactState::Touching) {
+            answer.contact.slipping_share = Some(rubbing.slipping_share);
+            if rubbing.slipping_share > SLIPPING_FROM {
+                answer.contact.state = ContactState::Slipping;
+            }
+        }
+        Ok(answer)
     }
 
-    fn answer(&self, wall: &Wall, equilibrium: &Equilibrium, touch_mm: f64) -> FiniteElementAnswer {
+    /// Displacement of a surface point far from the needle (mm).
+    fn sunk(&self, settled: &Settled, [x, y]: [f64; 2]) -> Vector3<f64> {
+        let column = self.patch.surface.column(x, y);
+        column.inward.into_inner() * settled.sink_mm(&column, 0.0)
+    }
+
+    fn answer(
+        &self,
+        wall: &Wall,
+        equilibrium: &Equilibrium,
+        touch_mm: f64,
+        beyond: &dyn Fn([f64; 2]) -> Vector3<f64>,
+    ) -> FiniteElementAnswer {
         let displacement: Vec<f64> =
             equilibrium.positions.iter().zip(&wall.geometry.rest).map(|(current, rest)| current - rest).collect();
         let node = |&parameter: &[f64; 2]| match locate(wall.topology(), &wall.geometry, parameter) {
             Some(sample) => sample.interpolate(&displacement),
-            None => Vector3::zeros(),
+            None => beyond(parameter),
         };
         let summary = wall.contact_summary(&equilibrium.positions);
         FiniteElementAnswer {
@@ -223,6 +274,7 @@ fn report(summary: &ContactSummary, max_strain: f64) -> ContactReport {
         max_pressure_kpa: summary.max_pressure_kpa,
         max_penetration_mm: summary.max_penetration_mm.max(0.0),
         max_strain,
+        slipping_share: None,
     }
 }
 
