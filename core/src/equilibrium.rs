@@ -120,6 +120,8 @@ pub struct Wall<'a> {
     tool: Tool<'a>,
     /// Positions without the needle's contact, where they are not those at rest.
     settled: Option<Vec<f64>>,
+    /// Force of the pressure on the whole surface (mN).
+    pressure_force_mn: f64,
 }
 
 /// One way to reach an equilibrium.
@@ -166,6 +168,8 @@ const SOFTENED_TOLERANCE: f64 = 1e-3;
 const POSE_FORCE_SCALE_MN: f64 = 0.01;
 /// Smallest force scale (mN): below it rounding of the tissue's stresses decides.
 const SMALLEST_FORCE_MN: f64 = 1e-7;
+/// The same in a wall under pressure, over the force of the pressure on the whole surface.
+const SMALLEST_FORCE_SHARE: f64 = 1e-6;
 /// What is tried, in this order: directly from the given start, then from first touch in load steps.
 const ATTEMPTS: [Attempt; 4] = [
     Attempt { load_steps: 1, globalization: Globalization::PredictedStress, max_iterations: 45 },
@@ -215,7 +219,7 @@ impl<'a> Wall<'a> {
         };
         let materials = topology.element_layer.iter().map(|&layer| lame(layer)).collect();
         let faces = ContactFaces::new(&topology.faces, &geometry.rest, contact.points_per_edge);
-        Ok(Wall { topology, geometry, materials, faces, solid, contact, tool, settled: None })
+        Ok(Wall { topology, geometry, materials, faces, solid, contact, tool, settled: None, pressure_force_mn: 0.0 })
     }
 
     /// The mesh's topology.
@@ -223,8 +227,10 @@ impl<'a> Wall<'a> {
         self.topology
     }
 
-    /// Lets the wall begin, and its rim stand, where every point has sunk along its column under a pressure.
-    pub fn settle(&mut self, surface: &Surface, settled: &Settled) {
+    /// Lets the wall begin, and its rim stand, where every point has sunk along its column under `pressure_kpa`.
+    pub fn settle(&mut self, surface: &Surface, settled: &Settled, pressure_kpa: f64) {
+        let area: f64 = (0..self.topology.faces.len()).flat_map(|face| self.faces.areas(face)).sum();
+        self.pressure_force_mn = pressure_kpa.abs() * area;
         let mut positions = self.geometry.rest.clone();
         for (vertex, &(point, _)) in self.topology.vertices.iter().enumerate() {
             let [x, y] = self.geometry.parameters[point];
@@ -423,7 +429,8 @@ impl<'a> Wall<'a> {
             driven: Some(self.topology.needle()),
             dead_load: &[],
         };
-        let scale = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN).max(SMALLEST_FORCE_MN);
+        let smallest = SMALLEST_FORCE_MN.max(SMALLEST_FORCE_SHARE * self.pressure_force_mn);
+        let scale = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN).max(smallest);
         let settings = NewtonSettings {
             globalization: attempt.globalization,
             force_scale_mn: scale,

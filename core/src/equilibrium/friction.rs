@@ -10,17 +10,19 @@ use nalgebra::{Point3, Vector3};
 use thiserror::Error;
 
 use super::{ATTEMPTS, Addition, Drive, Equilibrium, Load, RELATIVE_TOLERANCE, Wall};
-use crate::effect::Local;
+use crate::effect::{Effect, Local};
 use crate::effects::friction::{Friction, RubbingPoint, anchor};
 use crate::mesh::wall::Place;
 use crate::progress::Progress;
-use crate::solve::newton::{NewtonError, Workspace};
+use crate::solve::newton::{NewtonError, NewtonReport, Workspace};
 
 /// Slip from which on friction is at its limit (mm): what sticks creeps by less, a fraction of what the levels resolve.
 pub const FULL_SLIP_MM: f64 = 5e-4;
 /// Change of the pressures from one round to the next, relative to their sum, at which they count as settled. Friction is off by no more than
 /// this share.
 pub const SETTLED: f64 = 1e-3;
+/// Residual relative to the force scale at which a round stops; the last one goes on to that of every solve.
+const ROUND_TOLERANCE: f64 = 1e-3;
 /// Rounds before friction counts as not settling.
 const MAX_ROUNDS: usize = 40;
 /// Stick zone of the first round over the last one's.
@@ -69,6 +71,15 @@ struct Pressed {
     normals: Vec<Vector3<f64>>,
 }
 
+impl Pressed {
+    /// Sum of the changes of the forces since `earlier`, over their sum; 0 where nothing presses.
+    fn change_from(&self, earlier: &Pressed) -> f64 {
+        let changes = self.forces_mn.iter().zip(&earlier.forces_mn).map(|(now, before)| (now - before).abs());
+        let (change, sum): (f64, f64) = (changes.sum(), self.forces_mn.iter().sum());
+        if change > 0.0 { change / sum } else { 0.0 }
+    }
+}
+
 impl Wall<'_> {
     /// Finds the equilibrium under `load` with friction of the coefficient `coefficient` besides.
     ///
@@ -87,23 +98,28 @@ impl Wall<'_> {
         let mut pressed = self.pressed(&found.positions);
         let (mut last_error, mut mix) = (Vec::new(), MIX.1);
         let mut widening = FIRST_WIDENING;
+        let mut tolerance = ROUND_TOLERANCE;
         let mut change = f64::INFINITY;
         for round in 1..=MAX_ROUNDS {
             let points = self.rubbing_points(load, coefficient, &pressed);
             let friction = Friction { faces: &self.faces, points: &points, full_slip_mm: FULL_SLIP_MM * widening };
-            let additions: Vec<Addition> =
-                load.additions.iter().copied().chain([Addition { effect: &friction, place: Place::Faces }]).collect();
+            let rubs = [Addition { effect: &friction, place: Place::Faces }];
+            let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
             let with_friction = Load { additions: &additions, ..*load };
-            total += self.repeat(&with_friction, &mut found, workspace, progress)?;
-            let now = self.pressed(&found.positions);
-            let error: Vec<f64> = now.forces_mn.iter().zip(&pressed.forces_mn).map(|(new, used)| new - used).collect();
-            let sum: f64 = now.forces_mn.iter().sum();
-            change = error.iter().map(|e| e.abs()).sum::<f64>() / sum;
-            if widening == 1.0 && (change <= SETTLED || sum == 0.0) {
-                let rubbing = self.rubbing(&friction, &found.positions, round);
-                let newton = crate::solve::newton::NewtonReport { residual_mn: found.newton.residual_mn, ..total };
-                return Ok((Equilibrium { newton, ..found }, rubbing));
+            total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
+            let mut now = self.pressed(&found.positions);
+            change = now.change_from(&pressed);
+            if widening == 1.0 && change <= SETTLED && tolerance > RELATIVE_TOLERANCE {
+                tolerance = RELATIVE_TOLERANCE;
+                total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
+                now = self.pressed(&found.positions);
+                change = now.change_from(&pressed);
             }
+            if widening == 1.0 && change <= SETTLED {
+                let rubbing = self.rubbing(&friction, &found.positions, round);
+                return Ok((Equilibrium { newton: total, ..found }, rubbing));
+            }
+            let error: Vec<f64> = now.forces_mn.iter().zip(&pressed.forces_mn).map(|(new, used)| new - used).collect();
             if widening == 1.0 && last_error.len() == error.len() {
                 mix = next_mix(mix, &last_error, &error);
             }
@@ -117,14 +133,15 @@ impl Wall<'_> {
         Err(FrictionError::NotSettled { rounds: MAX_ROUNDS, change, allowed: SETTLED })
     }
 
-    /// One more solve from an equilibrium nearby: with full steps, and where they fail with a line search.
+    /// One more solve from an equilibrium nearby, to `tolerance` relative to the force scale: with full steps, and where they fail with a line search.
     fn repeat(
         &self,
         load: &Load,
+        tolerance: f64,
         found: &mut Equilibrium,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
-    ) -> Result<crate::solve::newton::NewtonReport, NewtonError> {
+    ) -> Result<NewtonReport, NewtonError> {
         let drive = match load.motion.force_mn {
             Some(force_mn) => Drive::Force { direction: load.motion.direction.into_inner(), force_mn },
             None => Drive::Held,
@@ -133,7 +150,7 @@ impl Wall<'_> {
         let mut failure = NewtonError::Interrupted { iterations: 0 };
         for attempt in [&ATTEMPTS[0], &ATTEMPTS[ATTEMPTS.len() - 1]] {
             let mut positions = found.positions.clone();
-            let drive = (drive, RELATIVE_TOLERANCE);
+            let drive = (drive, tolerance);
             match self.newton(&self.contact, drive, load, attempt, &mut positions, workspace, progress) {
                 Ok(mut report) => {
                     report.iterations += failed_iterations;
@@ -207,7 +224,6 @@ impl Wall<'_> {
 
     /// What slips, and with what force.
     fn rubbing(&self, friction: &Friction, positions: &[f64], rounds: usize) -> Rubbing {
-        use crate::effect::Effect;
         let stencils = &self.topology.faces;
         let n = stencils.group_size;
         let mut current = vec![0.0; 3 * n];

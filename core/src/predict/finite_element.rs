@@ -181,8 +181,8 @@ impl Problem<'_> {
             let yields = |kind| kind != LayerKind::Sclera || resolution.sclera_elements > 0;
             Settled::new(self.tissue, pressure_kpa, self.solid, yields)
         });
-        if let Some(settled) = &settled {
-            wall.settle(&self.patch.surface, settled);
+        if let (Some(settled), Some(pressure_kpa)) = (&settled, self.pressure_kpa) {
+            wall.settle(&self.patch.surface, settled, pressure_kpa);
         }
         let touch_mm = wall.touch(&self.motion.direction, estimate.touch_mm).unwrap_or(estimate.touch_mm);
         let motion = match self.motion.force_mn {

@@ -28,7 +28,7 @@ const EDGE_MM: f64 = 0.4;
 const HEIGHT_MM: f64 = 0.04;
 const STIFFNESS_KPA_PER_MM: f64 = 1e4;
 
-/// Mean slip of the block and mean friction force on it, or why it does not stand.
+/// Mean slip of the block's top and the friction force on the needle, or why the block does not stand.
 fn lean(coefficient: f64, tangent: f64) -> Result<(Vector3<f64>, Vector3<f64>), NewtonError> {
     let mesh =
         Mesh::glued(&block([2, 2, 1], |[s, t, w]| [EDGE_MM * (s - 0.5), EDGE_MM * (t - 0.5), HEIGHT_MM * (w - 1.0)]));
@@ -101,9 +101,9 @@ fn lean(coefficient: f64, tangent: f64) -> Result<(Vector3<f64>, Vector3<f64>), 
         };
         let mut workspace = Workspace::new(pattern, symbolic);
         let report = system.solve(&mut positions, Drive::Held, &settings, &mut workspace, &mut Silent)?;
-        slip =
-            (0..needle).map(|v| Vector3::from_fn(|k, _| positions[3 * v + k] - rest[3 * v + k])).sum::<Vector3<f64>>()
-                / needle as f64;
+        let top: Vec<usize> = (0..needle).filter(|&v| rest[3 * v + 2] == 0.0).collect();
+        let moved = |&v: &usize| Vector3::from_fn(|k, _| positions[3 * v + k] - rest[3 * v + k]);
+        slip = top.iter().map(moved).sum::<Vector3<f64>>() / top.len() as f64;
         force = (0..faces.len())
             .map(|group| {
                 faces.gather(group, &positions, &mut current);
