@@ -8,6 +8,7 @@ use retina_core::predict::{ContactState, Control, EffectChoice, Level, Predictio
 use retina_core::scene::Scene;
 use retina_core::scene::conditions::MMHG_KPA;
 use retina_core::tissue::{Layer, Tissue};
+use retina_tests::tolerance::BALANCE;
 
 use crate::support::{FAST, ask, built_in, largest_um, requests, straight};
 
@@ -265,5 +266,37 @@ fn a_membrane_a_thousand_times_as_stiff_holds_and_spreads_the_load() {
         }
         // A membrane of E t = 20 N/m against a retina of 5 N/m is felt.
         assert!(last < 0.95 * bare.needle.travel_mm, "{name}: {last}");
+    }
+}
+
+#[test]
+fn friction_is_found_over_the_working_range() {
+    for coefficient in [0.015, 0.5, 2.0] {
+        let (mut iterations, mut plain_iterations, mut asked) = (Vec::new(), Vec::new(), 0);
+        for (name, seed) in Scene::built_in_names().iter().zip(70..) {
+            let plain = built_in(name);
+            for request in requests(&plain, seed, 8) {
+                asked += 1;
+                let all = Request { level: Level::Coarse, effects: EffectChoice::All, ..request };
+                // What does not converge without friction is not friction's to answer for.
+                let Ok(without) = ask(&plain, &all) else { continue };
+                let with = ask(&rough(name, coefficient), &all)
+                    .unwrap_or_else(|e| panic!("{name} µ {coefficient}: {e}: {all:?}"));
+                let share = with.contact.slipping_share.unwrap();
+                assert!((0.0..=1.0).contains(&share) && simulated(&with, "friction"));
+                let Control::Force(force) = all.control else { panic!("force control") };
+                assert!((with.needle.reaction_mn.dot(&force) / force.norm_squared() + 1.0).abs() < BALANCE);
+                iterations.push(with.solver.iterations);
+                plain_iterations.push(without.solver.iterations);
+            }
+        }
+        iterations.sort_unstable();
+        plain_iterations.sort_unstable();
+        let (median, most) = (iterations[iterations.len() / 2], iterations[iterations.len() - 1]);
+        println!(
+            "µ {coefficient}: {asked} asked, Newton {median} median, {most} most; without friction {}",
+            plain_iterations[plain_iterations.len() / 2]
+        );
+        assert!(iterations.len() as f64 > 0.9 * asked as f64);
     }
 }

@@ -24,7 +24,9 @@ pub const SETTLED: f64 = 1e-3;
 /// Residual relative to the force scale at which a round stops; the last one goes on to that of every solve.
 const ROUND_TOLERANCE: f64 = 1e-3;
 /// Rounds before friction counts as not settling.
-const MAX_ROUNDS: usize = 40;
+const MAX_ROUNDS: usize = 60;
+/// After every so many rounds less of the found pressures is mixed in: points of a sharp edge that touch and let go in turn come to rest.
+const CALMING_ROUNDS: usize = 8;
 /// Stick zone of the first round over the last one's.
 const FIRST_WIDENING: f64 = 16.0;
 /// Factor by which the stick zone narrows from round to round.
@@ -121,12 +123,19 @@ impl Wall<'_> {
             }
             let error: Vec<f64> = now.forces_mn.iter().zip(&pressed.forces_mn).map(|(new, used)| new - used).collect();
             if widening == 1.0 && last_error.len() == error.len() {
-                mix = next_mix(mix, &last_error, &error);
+                mix = next_mix(mix, &last_error, &error).min(MIX.1 / (1 + round / CALMING_ROUNDS) as f64);
             }
             for (used, e) in pressed.forces_mn.iter_mut().zip(&error) {
                 *used = (*used + mix * e).max(0.0);
             }
-            pressed.normals = now.normals;
+            for (used, new) in pressed.normals.iter_mut().zip(&now.normals) {
+                // At a sharp edge normals swing as far as pressures; where the contact is new or gone, there is nothing to mix.
+                *used = if *used == Vector3::zeros() || *new == Vector3::zeros() {
+                    *new
+                } else {
+                    (*used * (1.0 - mix) + new * mix).normalize()
+                };
+            }
             last_error = if widening == 1.0 { error } else { Vec::new() };
             widening = (widening * NARROWING).max(1.0);
         }
