@@ -4,7 +4,9 @@ use nalgebra::{Point3, Unit, Vector3};
 use retina_core::equilibrium::Solid;
 use retina_core::equilibrium::settled::stretch;
 use retina_core::needle::{Needle, NeedleShape};
-use retina_core::predict::{ContactState, Control, EffectChoice, Level, Prediction, PreparedScene, Request};
+use retina_core::predict::{
+    ContactState, Control, EffectChoice, Level, PredictError, Prediction, PreparedScene, Request,
+};
 use retina_core::scene::Scene;
 use retina_core::scene::conditions::MMHG_KPA;
 use retina_core::tissue::{Layer, Tissue};
@@ -280,8 +282,14 @@ fn friction_is_found_over_the_working_range() {
                 let all = Request { level: Level::Coarse, effects: EffectChoice::All, ..request };
                 // What does not converge without friction is not friction's to answer for.
                 let Ok(without) = ask(&plain, &all) else { continue };
-                let with = ask(&rough(name, coefficient), &all)
-                    .unwrap_or_else(|e| panic!("{name} µ {coefficient}: {e}: {all:?}"));
+                let with = match ask(&rough(name, coefficient), &all) {
+                    Ok(with) => with,
+                    Err(error @ PredictError::Friction { .. }) => {
+                        println!("{name} µ {coefficient}: {error}");
+                        continue;
+                    }
+                    Err(error) => panic!("{name} µ {coefficient}: {error}: {all:?}"),
+                };
                 let share = with.contact.slipping_share.unwrap();
                 assert!((0.0..=1.0).contains(&share) && simulated(&with, "friction"));
                 let Control::Force(force) = all.control else { panic!("force control") };
@@ -297,6 +305,11 @@ fn friction_is_found_over_the_working_range() {
             "µ {coefficient}: {asked} asked, Newton {median} median, {most} most; without friction {}",
             plain_iterations[plain_iterations.len() / 2]
         );
-        assert!(iterations.len() as f64 > 0.9 * asked as f64);
+        // A bevel that stands on its edge in tissue that it cannot slide on may find no rest: refused, by name.
+        let refused = asked - iterations.len();
+        assert!(
+            refused <= if coefficient > 1.0 { asked / 8 } else { 0 },
+            "µ {coefficient}: {refused} of {asked} refused"
+        );
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! It starts from the frictionless equilibrium. The pressures of the next round are a mix of those used and those found (Irons & Tuck 1969): where the
 //! force along the motion is shared between pressure and friction, each round answers the last one's error with one of the opposite sign, and plain repetition
-//! would diverge beyond µ tan(angle) = 1. The friction itself begins with a wide stick zone that narrows from round to round, so that no solve has to find many points' way
+//! would diverge beyond µ tan(angle) = 1. The friction itself begins with a coefficient that rises and a wide stick zone that narrows from round to round, so that no solve has to find many points' way
 //! across it at once.
 //! Not here: the energy (`effects::friction`).
 
@@ -25,8 +25,13 @@ pub const SETTLED: f64 = 1e-3;
 const ROUND_TOLERANCE: f64 = 1e-3;
 /// Rounds before friction counts as not settling.
 const MAX_ROUNDS: usize = 60;
-/// After every so many rounds less of the found pressures is mixed in: points of a sharp edge that touch and let go in turn come to rest.
-const CALMING_ROUNDS: usize = 8;
+/// Largest rise of the coefficient from one round to the next: what is held at once by a high friction is held wherever it happens to be.
+const COEFFICIENT_STEP: f64 = 0.5;
+/// Factors on the largest share of the found pressures in the next mix after a round that changed more than the last, and after one that changed less: points
+/// of a sharp edge that touch and let go in turn come to rest.
+const CALMING: f64 = 0.5;
+/// See [`CALMING`].
+const HASTENING: f64 = 1.3;
 /// Stick zone of the first round over the last one's.
 const FIRST_WIDENING: f64 = 16.0;
 /// Factor by which the stick zone narrows from round to round.
@@ -101,9 +106,11 @@ impl Wall<'_> {
         let (mut last_error, mut mix) = (Vec::new(), MIX.1);
         let mut widening = FIRST_WIDENING;
         let mut tolerance = ROUND_TOLERANCE;
-        let mut change = f64::INFINITY;
+        let (mut change, mut last_change, mut cap) = (f64::INFINITY, f64::INFINITY, MIX.1);
         for round in 1..=MAX_ROUNDS {
-            let points = self.rubbing_points(load, coefficient, &pressed);
+            let reached = coefficient.min(round as f64 * COEFFICIENT_STEP);
+            let settling = reached == coefficient && widening == 1.0;
+            let points = self.rubbing_points(load, reached, &pressed);
             let friction = Friction { faces: &self.faces, points: &points, full_slip_mm: FULL_SLIP_MM * widening };
             let rubs = [Addition { effect: &friction, place: Place::Faces }];
             let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
@@ -111,20 +118,22 @@ impl Wall<'_> {
             total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
             let mut now = self.pressed(&found.positions);
             change = now.change_from(&pressed);
-            if widening == 1.0 && change <= SETTLED && tolerance > RELATIVE_TOLERANCE {
+            if settling && change <= SETTLED && tolerance > RELATIVE_TOLERANCE {
                 tolerance = RELATIVE_TOLERANCE;
                 total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
                 now = self.pressed(&found.positions);
                 change = now.change_from(&pressed);
             }
-            if widening == 1.0 && change <= SETTLED {
+            if settling && change <= SETTLED {
                 let rubbing = self.rubbing(&friction, &found.positions, round);
                 return Ok((Equilibrium { newton: total, ..found }, rubbing));
             }
             let error: Vec<f64> = now.forces_mn.iter().zip(&pressed.forces_mn).map(|(new, used)| new - used).collect();
-            if widening == 1.0 && last_error.len() == error.len() {
-                mix = next_mix(mix, &last_error, &error).min(MIX.1 / (1 + round / CALMING_ROUNDS) as f64);
+            if settling && last_error.len() == error.len() {
+                cap = if change > last_change { CALMING * cap } else { (HASTENING * cap).min(MIX.1) };
+                mix = next_mix(mix, &last_error, &error).min(cap);
             }
+            last_change = change;
             for (used, e) in pressed.forces_mn.iter_mut().zip(&error) {
                 *used = (*used + mix * e).max(0.0);
             }
@@ -136,8 +145,10 @@ impl Wall<'_> {
                     (*used * (1.0 - mix) + new * mix).normalize()
                 };
             }
-            last_error = if widening == 1.0 { error } else { Vec::new() };
-            widening = (widening * NARROWING).max(1.0);
+            last_error = if settling { error } else { Vec::new() };
+            if reached == coefficient {
+                widening = (widening * NARROWING).max(1.0);
+            }
         }
         Err(FrictionError::NotSettled { rounds: MAX_ROUNDS, change, allowed: SETTLED })
     }
