@@ -1,5 +1,6 @@
 //! The effects, one file each. A new one is one file here, one line below and one row in the derivative check.
 
+pub mod adhesion;
 pub mod contact;
 pub mod elasticity;
 pub mod finite_strain;
@@ -8,5 +9,5 @@ pub mod pressure;
 pub mod solid;
 
 /// Names of every effect, in the order in which reports list them.
-pub const EFFECT_NAMES: [&str; 5] =
-    [elasticity::NAME, finite_strain::NAME, contact::NAME, friction::NAME, pressure::NAME];
+pub const EFFECT_NAMES: [&str; 6] =
+    [elasticity::NAME, finite_strain::NAME, contact::NAME, friction::NAME, pressure::NAME, adhesion::NAME];

@@ -3,6 +3,7 @@
 //! Contract: every name in [`EFFECT_NAMES`] has a row in [`ROWS`]; one function, [`check_effect`], checks them all, at three sizes.
 //! Lengths are scaled with their moduli, so that a row is the same problem in other units of length.
 
+mod adhesion;
 mod friction;
 mod pressure;
 
@@ -36,12 +37,13 @@ const SIZES: [f64; 3] = [1.0, 1e-3, 1e3];
 const REPEATS: usize = 4;
 
 /// The rows of the derivative check: each runs [`check_effect`] on its effect.
-const ROWS: [(&str, fn()); 5] = [
+const ROWS: [(&str, fn()); 6] = [
     ("elasticity", check_elasticity),
     ("finite_strain", check_finite_strain),
     ("contact", check_contact),
     ("friction", friction::check),
     ("pressure", pressure::check),
+    ("adhesion", adhesion::check),
 ];
 
 fn largest(values: &[f64]) -> f64 {

@@ -6,5 +6,6 @@ mod homogeneous;
 mod incline;
 mod inflation;
 mod manufactured;
+mod peel;
 mod pressed_needle;
 mod pressed_slab;

@@ -76,7 +76,12 @@ impl Resolution {
                 LayerKind::Sclera => self.sclera_elements,
             })
             .collect();
-        WallDivision { core_cells: self.core_cells, rings: self.rings, elements_per_layer }
+        WallDivision {
+            core_cells: self.core_cells,
+            rings: self.rings,
+            elements_per_layer,
+            layers_above_interface: None,
+        }
     }
 }
 
