@@ -1,12 +1,23 @@
 //! The effects, one file each. A new one is one file here, one line below and one row in the derivative check.
 
+pub mod adhesion;
 pub mod contact;
 pub mod elasticity;
 pub mod finite_strain;
+pub mod friction;
 pub mod inertia;
+pub mod pressure;
 pub mod solid;
 pub mod viscoelasticity;
 
 /// Names of every effect, in the order in which reports list them.
-pub const EFFECT_NAMES: [&str; 5] =
-    [elasticity::NAME, finite_strain::NAME, contact::NAME, viscoelasticity::NAME, inertia::NAME];
+pub const EFFECT_NAMES: [&str; 8] = [
+    elasticity::NAME,
+    finite_strain::NAME,
+    contact::NAME,
+    friction::NAME,
+    pressure::NAME,
+    adhesion::NAME,
+    viscoelasticity::NAME,
+    inertia::NAME,
+];

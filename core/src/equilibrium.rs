@@ -3,6 +3,9 @@
 //! Patch frame throughout. [`Wall`] is the meshed problem; [`Wall::solve`] finds its equilibrium from a start, directly if it can, by load
 //! steps if it must. Not here: how fine a mesh a level uses, where the mesh is centred.
 
+pub mod friction;
+pub mod settled;
+
 use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
 
 use crate::effect::{Effect, Local};
@@ -19,6 +22,7 @@ use crate::solve::newton::{
 };
 use crate::surface::Surface;
 use crate::tissue::{LayerKind, Tissue};
+use settled::Settled;
 
 /// Which solid energy is simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,6 +118,10 @@ pub struct Wall<'a> {
     solid: Solid,
     contact: ContactSettings,
     tool: Tool<'a>,
+    /// Positions without the needle's contact, where they are not those at rest.
+    settled: Option<Vec<f64>>,
+    /// Force of the pressure on the whole surface (mN).
+    pressure_force_mn: f64,
 }
 
 /// One way to reach an equilibrium.
@@ -160,6 +168,8 @@ const SOFTENED_TOLERANCE: f64 = 1e-3;
 const POSE_FORCE_SCALE_MN: f64 = 0.01;
 /// Smallest force scale (mN): below it rounding of the tissue's stresses decides.
 const SMALLEST_FORCE_MN: f64 = 1e-7;
+/// The same in a wall under pressure, over the force of the pressure on the whole surface.
+const SMALLEST_FORCE_SHARE: f64 = 1e-6;
 /// What is tried, in this order: directly from the given start, then from first touch in load steps.
 const ATTEMPTS: [Attempt; 4] = [
     Attempt { load_steps: 1, globalization: Globalization::PredictedStress, max_iterations: 45 },
@@ -211,7 +221,7 @@ impl<'a> Wall<'a> {
         };
         let materials = topology.element_layer.iter().map(|&layer| lame(layer)).collect();
         let faces = ContactFaces::new(&topology.faces, &geometry.rest, contact.points_per_edge);
-        Ok(Wall { topology, geometry, materials, faces, solid, contact, tool })
+        Ok(Wall { topology, geometry, materials, faces, solid, contact, tool, settled: None, pressure_force_mn: 0.0 })
     }
 
     /// The mesh's topology.
@@ -224,14 +234,30 @@ impl<'a> Wall<'a> {
         &self.faces
     }
 
-    /// Rest positions with the needle's tip at its given pose.
-    pub fn start(&self) -> Vec<f64> {
+    /// Lets the wall begin, and its rim stand, where every point has sunk along its column under `pressure_kpa`.
+    pub fn settle(&mut self, surface: &Surface, settled: &Settled, pressure_kpa: f64) {
+        let area: f64 = (0..self.topology.faces.len()).flat_map(|face| self.faces.areas(face)).sum();
+        self.pressure_force_mn = pressure_kpa.abs() * area;
         let mut positions = self.geometry.rest.clone();
+        for (vertex, &(point, _)) in self.topology.vertices.iter().enumerate() {
+            let [x, y] = self.geometry.parameters[point];
+            let column = surface.column(x, y);
+            let sink = column.inward.into_inner() * settled.sink_mm(&column, self.geometry.layer_coordinates[vertex]);
+            for k in 0..3 {
+                positions[3 * vertex + k] += sink[k];
+            }
+        }
+        self.settled = Some(positions);
+    }
+
+    /// Positions without contact, with the needle's tip at its given pose.
+    pub fn start(&self) -> Vec<f64> {
+        let mut positions = self.settled.as_ref().unwrap_or(&self.geometry.rest).clone();
         self.place_tip(&mut positions, &Vector3::zeros());
         positions
     }
 
-    /// Positions displaced by `field` (patch parameters and depth in layers in, displacement out), the needle's tip at its given
+    /// Positions without contact displaced by `field` (patch parameters and depth in layers in, displacement out), the needle's tip at its given
     /// pose. Fixed vertices stay.
     pub fn displaced(&self, field: &dyn Fn([f64; 2], f64) -> Vector3<f64>) -> Vec<f64> {
         let mut positions = self.start();
@@ -416,7 +442,8 @@ impl<'a> Wall<'a> {
             driven: Some(self.topology.needle()),
             dead_load: &[],
         };
-        let scale = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN).max(SMALLEST_FORCE_MN);
+        let smallest = SMALLEST_FORCE_MN.max(SMALLEST_FORCE_SHARE * self.pressure_force_mn);
+        let scale = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN).max(smallest);
         let settings = NewtonSettings {
             globalization: attempt.globalization,
             force_scale_mn: scale,

@@ -20,7 +20,9 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use crate::effects::contact;
+use crate::effects::{contact, finite_strain, friction};
+use crate::equilibrium::Solid;
+use crate::equilibrium::settled::Settled;
 use crate::equilibrium::{Motion, Tool};
 use crate::mesh::wall::WallTopology;
 use crate::needle::Body;
@@ -30,7 +32,8 @@ use crate::scene::{Scene, SceneSurface};
 use crate::solve::newton;
 use beds::Beds;
 use budget::{Budget, Choice, LevelTimes};
-use choice::{Decision, Expected, decide};
+use choice::friction::Sliding;
+use choice::{Decision, Expected, decide, pressure};
 use expected_error::{ExpectedError, Situation};
 use finite_element::{Bench, COARSE, ContactEstimate, FiniteElementAnswer, Problem, REFERENCE, Resolution};
 use linear::{LinearAnswer, Load, Press, press};
@@ -133,7 +136,7 @@ impl PreparedScene {
     pub fn situation(&self, request: &Request) -> Result<Situation, PredictError> {
         let body = request.needle.shape.body();
         let question = self.aimed(request, &body)?;
-        Ok(match question.begin()? {
+        Ok(match question.begin(&question.raised(&question.sink()))? {
             Begun::Still(_) => question.situation(0.0, 0.0, None),
             Begun::Pressed(linear) => question.situation_under(&linear),
         })
@@ -219,21 +222,30 @@ enum Begun<'a> {
     Pressed(LinearAnswer<'a>),
 }
 
+/// What the eye's pressure does by itself.
+pub(crate) struct Sink {
+    /// The decision about the effect.
+    pub(crate) report: EffectReport,
+    /// Change of the pressure (kPa), where it is simulated.
+    change_kpa: Option<f64>,
+    /// Sinking that linear elasticity expects of it at the patch's centre, in magnitude (mm); 0 where it is not simulated.
+    expected_mm: f64,
+}
+
 impl Question<'_> {
     pub(crate) fn patch(&self) -> &Patch {
         self.patch.patch()
     }
 
     /// The linear answer inside the limits of the tissue model; `None` where the needle does not reach the surface.
-    pub(crate) fn pressed(&self) -> Result<Option<LinearAnswer<'_>>, PredictError> {
-        let press = press(self.patch(), &self.tool, &self.motion)?;
+    pub(crate) fn pressed(&self, tool: &Tool) -> Result<Option<LinearAnswer<'_>>, PredictError> {
+        let press = press(self.patch(), tool, &self.motion)?;
         self.check_pressure(&press)?;
         if matches!(press.load, Load::Depth(depth) if depth <= 0.0) {
             return Ok(None);
         }
         let tip = self.request.needle.shape.tip;
-        let linear =
-            LinearAnswer::new(&self.prepared.beds, self.patch(), &self.tool, tip, press, &self.motion.direction)?;
+        let linear = LinearAnswer::new(&self.prepared.beds, self.patch(), tool, tip, press, &self.motion.direction)?;
         self.check_depth(&linear)?;
         Ok(Some(linear))
     }
@@ -244,35 +256,39 @@ impl Question<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<Prediction, PredictError> {
-        let linear = match self.begin()? {
+        let sink = self.sink();
+        let sliding = Sliding { coefficient: self.prepared.scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
+        let linear = match self.begin(&self.raised(&sink))? {
             Begun::Pressed(linear) => linear,
             Begun::Still(why) => {
-                let still = Expected { depth_mm: 0.0, strain: 0.0 };
-                let decision = decide(&self.request.effects, self.request.level, still)?;
-                return Ok(self.at_rest(decision, why));
+                let strain = sink.expected_mm / self.yielding_mm();
+                let decision = self.decide(Expected { depth_mm: sink.expected_mm, strain, sliding }, &sink)?;
+                return Ok(self.at_rest(decision, sink.change_kpa, why));
             }
         };
         let strain = linear.depth_mm / self.yielding_mm();
-        let decision =
-            decide(&self.request.effects, self.request.level, Expected { depth_mm: linear.depth_mm, strain })?;
+        let moved_mm = linear.depth_mm + sink.expected_mm;
+        let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
+        let expected = Expected { depth_mm: moved_mm, strain: moved_mm / self.yielding_mm(), sliding };
+        let decision = self.decide(expected, &sink)?;
         if !decision.contact {
-            return Ok(self.at_rest(decision, "contact is not simulated"));
+            return Ok(self.at_rest(decision, sink.change_kpa, "contact is not simulated"));
         }
         let answer = match self.request.level {
-            Level::Linear => self.linear(&linear, strain),
-            Level::Coarse => self.coarse(&linear, &decision, workspace, progress)?,
-            Level::Reference => self.fine(resolution, &linear, &decision, workspace, progress)?,
+            Level::Linear => self.linear(&linear, strain, &sink),
+            Level::Coarse => self.coarse(&linear, &decision, sink.change_kpa, workspace, progress)?,
+            Level::Reference => self.fine(resolution, &linear, &decision, sink.change_kpa, workspace, progress)?,
         };
         let expected = self.situation_under(&linear).expected_error(self.request.level);
         Ok(self.prediction(self.with_node_penetration(answer), decision, expected))
     }
 
     /// The linear answer, or why nothing moves.
-    fn begin(&self) -> Result<Begun<'_>, PredictError> {
+    fn begin(&self, tool: &Tool) -> Result<Begun<'_>, PredictError> {
         if self.motion.force_mn == Some(0.0) {
             return Ok(Begun::Still("no force is applied"));
         }
-        Ok(match self.pressed()? {
+        Ok(match self.pressed(tool)? {
             Some(linear) => Begun::Pressed(linear),
             None => Begun::Still("the needle does not reach the surface"),
         })
@@ -286,6 +302,53 @@ impl Question<'_> {
         let points = self.tool.patch_from_needle.rotation * -Vector3::z_axis();
         let angle_deg = press.map_or(0.0, |press| points.dot(&press.touch.inward).clamp(-1.0, 1.0).acos().to_degrees());
         Situation::new(&self.prepared.scene, &self.request.needle.shape, angle_deg, depth_mm, strain)
+    }
+
+    /// What the eye's pressure does by itself.
+    pub(crate) fn sink(&self) -> Sink {
+        let Scene { tissue, .. } = &self.prepared.scene;
+        let change_kpa = self.prepared.scene.pressure_change_kpa();
+        let linear = Settled::new(tissue, change_kpa, Solid::Elasticity, |_| true);
+        let centre = self.patch().surface.column(0.0, 0.0);
+        let report = pressure::report(&self.request.effects, change_kpa, linear.sink_mm(&centre, 0.0) * 1e3);
+        let simulated = report.simulated;
+        let expected_mm = if simulated { linear.sink_mm(&centre, 0.0).abs() } else { 0.0 };
+        Sink { report, change_kpa: simulated.then_some(change_kpa), expected_mm }
+    }
+
+    fn decide(&self, expected: Expected, sink: &Sink) -> Result<Decision, PredictError> {
+        decide(&self.request.effects, self.request.level, expected, &sink.report)
+    }
+
+    /// The surface far from the needle under the pressure, by the law of `solid`.
+    fn settled(&self, change_kpa: Option<f64>, solid: Solid) -> Option<Settled> {
+        change_kpa.map(|change_kpa| Settled::new(&self.prepared.scene.tissue, change_kpa, solid, |_| true))
+    }
+
+    /// How far the surface at `parameter` sinks under the pressure (mm).
+    fn sunk(&self, settled: Option<&Settled>, [x, y]: [f64; 2]) -> Vector3<f64> {
+        settled.map_or_else(Vector3::zeros, |settled| {
+            let column = self.patch().surface.column(x, y);
+            column.inward.into_inner() * settled.sink_mm(&column, 0.0)
+        })
+    }
+
+    /// The tool as it stands to the surface at rest: raised by what the surface under it has sunk.
+    fn raised(&self, sink: &Sink) -> Tool<'_> {
+        let mut tool = self.tool;
+        if sink.change_kpa.is_some() {
+            // What `decide` will find unless the sinking itself is small.
+            let finite = match &self.request.effects {
+                EffectChoice::Named(names) => names.iter().any(|name| name == finite_strain::NAME),
+                EffectChoice::Auto | EffectChoice::All => true,
+            };
+            let finite = finite && self.request.level != Level::Linear;
+            let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
+            let at = tool.patch_from_needle.translation.vector;
+            tool.patch_from_needle.translation.vector -=
+                self.sunk(self.settled(sink.change_kpa, solid).as_ref(), [at.x, at.y]);
+        }
+        tool
     }
 
     /// Adds to the reported penetration that of the patch's own nodes: a coarse face may cut a sharp edge between its quadrature points.
@@ -328,11 +391,12 @@ impl Question<'_> {
         if depth_mm > limit_mm { Err(PredictError::TooDeep { depth_mm, limit_mm }) } else { Ok(()) }
     }
 
-    fn linear(&self, linear: &LinearAnswer, strain: f64) -> FiniteElementAnswer {
+    fn linear(&self, linear: &LinearAnswer, strain: f64, sink: &Sink) -> FiniteElementAnswer {
+        let settled = self.settled(sink.change_kpa, Solid::Elasticity);
         let radius_mm = linear.contact_radius_mm;
         let travel_mm = if self.motion.force_mn.is_some() { linear.travel_mm() } else { 0.0 };
-        let displacements: Vec<Vector3<f64>> =
-            self.patch().parameters.iter().map(|&parameter| linear.displacement(parameter)).collect();
+        let moved = |&parameter: &[f64; 2]| linear.displacement(parameter) + self.sunk(settled.as_ref(), parameter);
+        let displacements: Vec<Vector3<f64>> = self.patch().parameters.iter().map(moved).collect();
         FiniteElementAnswer {
             displacements,
             travel_mm,
@@ -343,6 +407,7 @@ impl Question<'_> {
                 max_pressure_kpa: linear.max_pressure_kpa,
                 max_penetration_mm: 0.0,
                 max_strain: strain,
+                slipping_share: None,
             },
             solver: SolverReport::default(),
             estimate: self.estimate(linear),
@@ -374,13 +439,15 @@ impl Question<'_> {
         }
     }
 
-    pub(crate) fn problem(&self, decision: &Decision) -> Problem<'_> {
+    pub(crate) fn problem(&self, decision: &Decision, pressure_kpa: Option<f64>) -> Problem<'_> {
         Problem {
             patch: self.patch(),
             tissue: &self.prepared.scene.tissue,
             tool: self.tool,
             motion: self.motion,
             solid: decision.solid,
+            friction_coefficient: decision.friction.then_some(self.prepared.scene.friction_coefficient),
+            pressure_kpa,
         }
     }
 
@@ -388,6 +455,7 @@ impl Question<'_> {
         &self,
         linear: &LinearAnswer,
         decision: &Decision,
+        change_kpa: Option<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
@@ -402,7 +470,7 @@ impl Question<'_> {
         let mut bench =
             Bench { level: Level::Coarse.name(), resolution: &COARSE, topology: &topology, workspace: solver };
         let start = self.start(linear);
-        self.problem(decision).solve(&mut bench, &self.estimate(linear), &start, progress)
+        self.problem(decision, change_kpa).solve(&mut bench, &self.estimate(linear), &start, progress)
     }
 
     /// A finer answer than `coarse`, on a mesh made for the contact that `coarse` finds.
@@ -411,10 +479,11 @@ impl Question<'_> {
         resolution: &Resolution,
         linear: &LinearAnswer,
         decision: &Decision,
+        change_kpa: Option<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
-        let coarse = self.coarse(linear, decision, workspace, progress)?;
+        let coarse = self.coarse(linear, decision, change_kpa, workspace, progress)?;
         let topology = shared_topology(resolution.division(&self.prepared.scene.tissue))?;
         let mut solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
         let mut bench =
@@ -426,18 +495,23 @@ impl Question<'_> {
             ..self.estimate(linear)
         };
         let start = self.start(linear);
-        let mut answer = self.problem(decision).solve(&mut bench, &aim, &start, progress)?;
+        let mut answer = self.problem(decision, change_kpa).solve(&mut bench, &aim, &start, progress)?;
         answer.solver.iterations += coarse.solver.iterations;
         Ok(answer)
     }
 
-    pub(crate) fn at_rest(&self, mut decision: Decision, reason: &str) -> Prediction {
-        if let Some(contact) = decision.reports.iter_mut().find(|report| report.name == contact::NAME) {
-            contact.simulated = false;
-            contact.reason = reason.to_owned();
+    /// The answer without contact: the surface at rest, or where the pressure moves it.
+    pub(crate) fn at_rest(&self, mut decision: Decision, change_kpa: Option<f64>, reason: &str) -> Prediction {
+        for report in &mut decision.reports {
+            if [contact::NAME, friction::NAME].contains(&report.name) {
+                report.simulated = false;
+                report.reason = reason.to_owned();
+            }
         }
+        let settled = self.settled(change_kpa, decision.solid);
+        let moved = |&parameter: &[f64; 2]| self.sunk(settled.as_ref(), parameter);
         let answer = FiniteElementAnswer {
-            displacements: vec![Vector3::zeros(); self.patch().vertices.len()],
+            displacements: self.patch().parameters.iter().map(moved).collect(),
             travel_mm: 0.0,
             reaction_mn: Vector3::zeros(),
             contact: ContactReport {
@@ -445,7 +519,8 @@ impl Question<'_> {
                 area_mm2: 0.0,
                 max_pressure_kpa: 0.0,
                 max_penetration_mm: 0.0,
-                max_strain: 0.0,
+                max_strain: settled.as_ref().map_or(0.0, Settled::max_strain),
+                slipping_share: None,
             },
             solver: SolverReport::default(),
             estimate: ContactEstimate { center: [0.0; 2], radius_mm: 0.0, touch_mm: 0.0, travel_mm: 0.0 },

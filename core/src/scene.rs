@@ -3,7 +3,9 @@
 //! Contract: a scene does not change during a prediction. The built-in ones stand at the origin, so their patch frame is the scene
 //! frame. Units: mm, kPa.
 //!
-//! Not here: the needle and its force (they come with each request), effects.
+//! Not here: the needle and its force (they come with each request), effects, the ranges of pressure and friction (`conditions`).
+
+pub mod conditions;
 
 use std::sync::Arc;
 
@@ -14,6 +16,7 @@ use crate::patch::{Patch, PatchError};
 use crate::range::{OutOfRange, ParameterRange};
 use crate::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA, Surface, TriangleMesh};
 use crate::tissue::Tissue;
+use conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
 
 /// Thickness of the retina around the built-in fovea, mm: its thickest by the source of [`PIT_DEPTH`], so the floor is 0.10 mm.
 pub const FOVEA_RETINA_MM: f64 = 0.23;
@@ -57,6 +60,12 @@ pub struct Scene {
     pub tissue: Tissue,
     /// Where the patch of an analytic surface stands: takes patch to scene coordinates, mm. A mesh places its own patch.
     pub scene_from_patch: Isometry3<f64>,
+    /// Coulomb's coefficient between needle and retina, a pure number.
+    pub friction_coefficient: f64,
+    /// Pressure in the eye, kPa.
+    pub pressure_kpa: f64,
+    /// Pressure in the eye when the surface was measured, kPa.
+    pub rest_pressure_kpa: f64,
 }
 
 impl Scene {
@@ -73,7 +82,15 @@ impl Scene {
             }
             _ => return None,
         };
-        Some(Self { name: name.to_owned(), surface, tissue, scene_from_patch: Isometry3::identity() })
+        Some(Self {
+            name: name.to_owned(),
+            surface,
+            tissue,
+            scene_from_patch: Isometry3::identity(),
+            friction_coefficient: FRICTION_COEFFICIENT.default,
+            pressure_kpa: EYE_PRESSURE.default,
+            rest_pressure_kpa: EYE_PRESSURE.default,
+        })
     }
 
     /// Names of the built-in scenes: a plane, the macula as a part of the eye's ball, and the foveal pit.
@@ -84,6 +101,9 @@ impl Scene {
     /// Holds surface, tissue and placement against their ranges; fails with the first that is outside.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         self.tissue.validate()?;
+        FRICTION_COEFFICIENT.check("friction_coefficient", self.friction_coefficient)?;
+        EYE_PRESSURE.check("pressure_kpa", self.pressure_kpa)?;
+        EYE_PRESSURE.check("rest_pressure_kpa", self.rest_pressure_kpa)?;
         match self.surface {
             SceneSurface::Flat | SceneSurface::Mesh(_) => {}
             SceneSurface::Sphere { radius_mm } => EYE_RADIUS.check("surface.radius_mm", radius_mm)?,
@@ -99,6 +119,11 @@ impl Scene {
         }
         let norm = self.scene_from_patch.rotation.quaternion().norm();
         ORIENTATION_NORM.check("scene_from_patch.rotation_xyzw", norm)
+    }
+
+    /// Change of the pressure since the surface was measured, kPa.
+    pub fn pressure_change_kpa(&self) -> f64 {
+        self.pressure_kpa - self.rest_pressure_kpa
     }
 
     /// The patch that a needle meets at a contact in scene coordinates, mm.

@@ -6,6 +6,7 @@ use retina_core::patch::{NODES_PER_SIDE, SPACING_MM};
 use retina_core::predict::Level;
 use retina_core::predict::budget::DEFAULT_LEVEL;
 use retina_core::range::ParameterRange;
+use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::sequence::TIME_STEP;
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
@@ -84,7 +85,14 @@ fn spec(scene: &Scene) -> SceneSpec {
         }
         SceneSurface::Mesh(_) => surface.kind = SurfaceKind::Mesh,
     }
-    SceneSpec { surface: Some(surface), tissue: Some(tissue(&scene.tissue)), pose: None }
+    SceneSpec {
+        surface: Some(surface),
+        tissue: Some(tissue(&scene.tissue)),
+        pose: None,
+        friction_coefficient: Some(scene.friction_coefficient),
+        pressure_kpa: Some(scene.pressure_kpa),
+        rest_pressure_kpa: Some(scene.rest_pressure_kpa),
+    }
 }
 
 fn tissue(tissue: &Tissue) -> TissueSpec {
@@ -134,6 +142,9 @@ fn parameters() -> Vec<ParameterEntry> {
         ("scene.tissue.rate.density_kg_per_mm3", &DENSITY),
         ("scene.tissue.rate.vitreous_drag_kpa_s_per_mm", &VITREOUS_DRAG),
         ("steps[].time_s", &TIME_STEP),
+        ("scene.friction_coefficient", &FRICTION_COEFFICIENT),
+        ("scene.pressure_kpa", &EYE_PRESSURE),
+        ("scene.rest_pressure_kpa", &EYE_PRESSURE),
     ];
     let layers = [
         ("inner_limiting_membrane", &INNER_LIMITING_MEMBRANE),

@@ -5,6 +5,7 @@
 //!
 //! Not here: values (`verification`), errors (`accuracy`).
 
+mod effects;
 mod equilibrium;
 mod frames;
 mod refusals;

@@ -3,6 +3,10 @@
 //! Contract: every name in [`EFFECT_NAMES`] has a row in [`ROWS`]; one function, [`check_effect`], checks them all, at three sizes.
 //! Lengths are scaled with their moduli, so that a row is the same problem in other units of length.
 
+mod adhesion;
+mod friction;
+mod pressure;
+
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use retina_core::effect::{Effect, Local, Stencils};
 use retina_core::effects::EFFECT_NAMES;
@@ -35,10 +39,13 @@ const SIZES: [f64; 3] = [1.0, 1e-3, 1e3];
 const REPEATS: usize = 4;
 
 /// The rows of the derivative check: each runs [`check_effect`] on its effect.
-const ROWS: [(&str, fn()); 5] = [
+const ROWS: [(&str, fn()); 8] = [
     ("elasticity", check_elasticity),
     ("finite_strain", check_finite_strain),
     ("contact", check_contact),
+    ("friction", friction::check),
+    ("pressure", pressure::check),
+    ("adhesion", adhesion::check),
     ("viscoelasticity", check_viscoelasticity),
     ("inertia", check_inertia),
 ];

@@ -79,7 +79,7 @@ fn shapes_sum_to_one_are_one_at_their_node_and_reproduce_quadratics() {
 }
 
 fn division() -> WallDivision {
-    WallDivision { core_cells: 2, rings: 3, elements_per_layer: vec![1, 1] }
+    WallDivision { core_cells: 2, rings: 3, elements_per_layer: vec![1, 1], layers_above_interface: None }
 }
 
 fn disc_geometry(rings: usize, center: [f64; 2]) -> DiscGeometry {
@@ -291,7 +291,10 @@ fn a_factor_solves_and_an_indefinite_matrix_is_refused() {
 
 #[test]
 fn nested_dissection_is_a_permutation_with_less_fill() {
-    for division in [division(), WallDivision { core_cells: 4, rings: 6, elements_per_layer: vec![1] }] {
+    for division in [
+        division(),
+        WallDivision { core_cells: 4, rings: 6, elements_per_layer: vec![1], layers_above_interface: None },
+    ] {
         let topology = WallTopology::new(division.clone()).unwrap();
         let mut order = nested_dissection(&topology.disc);
         let fill = topology.symbolic.stored();

@@ -3,6 +3,9 @@
 pub mod block;
 mod closed_forms;
 mod homogeneous;
+mod incline;
+mod inflation;
 mod manufactured;
+mod peel;
 mod pressed_needle;
 mod pressed_slab;

@@ -26,6 +26,17 @@ pub struct WallDivision {
     pub rings: usize,
     /// Elements through each tissue layer, inner layer first.
     pub elements_per_layer: Vec<usize>,
+    /// How many layers, counted from the inner one, stand on an interface of their own: the vertices below them are there twice. `None`: all layers are
+    /// one body.
+    pub layers_above_interface: Option<usize>,
+}
+
+impl WallDivision {
+    /// Elements from the base up to the interface; all of them where there is none.
+    fn elements_below_interface(&self) -> usize {
+        let above = self.layers_above_interface.unwrap_or(0);
+        self.elements_per_layer.iter().skip(above).sum()
+    }
 }
 
 /// A mesh that could not be made.
@@ -46,6 +57,8 @@ pub enum Place {
     Elements,
     /// The inner surface and the needle, [`WallTopology::faces`].
     Faces,
+    /// The two sides of the interface, [`WallTopology::interface`].
+    Interface,
 }
 
 /// Everything that depends on the division alone.
@@ -61,6 +74,8 @@ pub struct WallTopology {
     pub element_layer: Vec<usize>,
     /// Inner-surface faces: face nodes, then the needle.
     pub faces: Stencils,
+    /// The interface's faces: nodes of the lower side, then those of the upper one in the same order; none without an interface.
+    pub interface: Stencils,
     /// For each disc cell, its face's vertices in face-node order.
     pub face_points: Vec<Vec<usize>>,
     /// For each vertex (without the needle): its lattice point of the disc and its level (0 at the base).
@@ -79,6 +94,7 @@ impl WallTopology {
         match place {
             Place::Elements => Term { effect, stencils: &self.elements, set: 0 },
             Place::Faces => Term { effect, stencils: &self.faces, set: 1 },
+            Place::Interface => Term { effect, stencils: &self.interface, set: 2 },
         }
     }
 
@@ -98,8 +114,11 @@ impl WallTopology {
             .collect();
 
         let offsets = &*NODE_OFFSETS;
-        let lattice =
-            |cell: &[usize], layer: usize, [i, j, k]: [usize; 3]| (cell[j * (ORDER + 1) + i], layer * ORDER + k);
+        let below = division.elements_below_interface();
+        // Above an interface every level counts one more: the interface has two.
+        let lattice = |cell: &[usize], layer: usize, [i, j, k]: [usize; 3]| {
+            (cell[j * (ORDER + 1) + i], layer * ORDER + k + usize::from(layer >= below))
+        };
         let mut used: HashMap<usize, Vec<usize>> = HashMap::new();
         for cell in &cells {
             for layer in 0..layers.len() {
@@ -126,6 +145,7 @@ impl WallTopology {
         let mut element_layer = Vec::new();
         let mut faces = Stencils { group_size: 0, vertices: Vec::new() };
         let mut face_points = Vec::new();
+        let mut interface = Stencils { group_size: 2 * TOP_NODES.len(), vertices: Vec::new() };
         for cell in &cells {
             for (at, &layer) in layers.iter().enumerate() {
                 elements.vertices.extend(offsets.iter().map(|&o| index[&lattice(cell, at, o)] as u32));
@@ -137,10 +157,20 @@ impl WallTopology {
             faces.vertices.extend(face.iter().map(|&v| v as u32));
             faces.vertices.push(needle as u32);
             face_points.push(face);
+            if (1..layers.len()).contains(&below) {
+                let side = |layer: usize, k: usize| {
+                    TOP_NODES.map(|a| index[&lattice(cell, layer, [offsets[a][0], offsets[a][1], k])] as u32)
+                };
+                interface.vertices.extend(side(below - 1, ORDER).into_iter().chain(side(below, 0)));
+            }
         }
         let fixed = |vertex: usize, _| vertices[vertex].1 == 0 || disc.is_rim(vertices[vertex].0);
         let dofs = Dofs::new(needle + 1, 0..needle, fixed, Some(needle));
-        let pattern = Pattern::new(&dofs, &[&elements, &faces]);
+        let mut sets = vec![&elements, &faces];
+        if !interface.is_empty() {
+            sets.push(&interface);
+        }
+        let pattern = Pattern::new(&dofs, &sets);
         let symbolic = SymbolicFactor::new(&pattern)?;
         Ok(WallTopology {
             division,
@@ -148,6 +178,7 @@ impl WallTopology {
             elements,
             element_layer,
             faces,
+            interface,
             face_points,
             vertices,
             dofs,
@@ -233,7 +264,10 @@ struct Level {
 fn levels(topology: &WallTopology, layers: &[LayerThickness]) -> Vec<Level> {
     let mut from_surface = vec![Level::default()];
     let mut top = Level::default();
-    for (layer, &count) in layers.iter().zip(&topology.division.elements_per_layer) {
+    for (index, (layer, &count)) in layers.iter().zip(&topology.division.elements_per_layer).enumerate() {
+        if topology.division.layers_above_interface == Some(index) {
+            from_surface.push(top);
+        }
         let ratio = growth(layer, count);
         let total: f64 = (0..count).map(|element| ratio.powi(element as i32)).sum();
         let mut share = 0.0;

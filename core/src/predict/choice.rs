@@ -1,8 +1,13 @@
-//! Which effects a request calls for, and why.
+//! Which effects a request calls for, and why. Solid and contact here, every other effect's criterion in a file of its own.
+
+mod criterion;
+pub mod friction;
+pub mod pressure;
 
 use super::types::{EffectChoice, EffectReport, Level, PredictError};
 use crate::effects::{EFFECT_NAMES, contact, elasticity, finite_strain, inertia, viscoelasticity};
 use crate::equilibrium::Solid;
+use friction::Sliding;
 
 /// Error that `auto` accepts for leaving an effect out (µm): a tenth of the best published tool-to-layer error (9 µm).
 pub const AUTO_TOLERANCE_UM: f64 = 1.0;
@@ -17,6 +22,8 @@ pub struct Decision {
     pub solid: Solid,
     /// Whether the needle is seen at all.
     pub contact: bool,
+    /// Whether needle and tissue rub.
+    pub friction: bool,
     /// The report, in the order of [`EFFECT_NAMES`].
     pub reports: Vec<EffectReport>,
 }
@@ -28,13 +35,20 @@ pub struct Expected {
     pub depth_mm: f64,
     /// That depth over the thickness of what yields (retina and choroid): a mean strain.
     pub strain: f64,
+    /// How the needle slides.
+    pub sliding: Sliding,
 }
 
-/// Decides for `choice` at `level`.
+/// Decides for `choice` at `level`; `pressure` is what was decided about it before anything was pressed.
 ///
 /// # Errors
 /// [`PredictError::Effect`] for a name that does not exist or a list without a solid.
-pub fn decide(choice: &EffectChoice, level: Level, expected: Expected) -> Result<Decision, PredictError> {
+pub fn decide(
+    choice: &EffectChoice,
+    level: Level,
+    expected: Expected,
+    pressure: &EffectReport,
+) -> Result<Decision, PredictError> {
     // A strain ε changes the answer by the order of ε times itself.
     let linearisation_error_um = expected.strain * expected.depth_mm * 1e3;
     let called_for = linearisation_error_um > AUTO_TOLERANCE_UM;
@@ -86,9 +100,12 @@ pub fn decide(choice: &EffectChoice, level: Level, expected: Expected) -> Result
             contact,
             if contact { "the needle reaches the surface" } else { "as listed in the request" },
         ),
+        friction::report(choice, level, contact, &expected.sliding),
+        pressure.clone(),
         plain(viscoelasticity::NAME, false, STATIC),
         plain(inertia::NAME, false, STATIC),
     ];
     let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
-    Ok(Decision { solid, contact, reports })
+    let friction = reports.iter().any(|report| report.name == crate::effects::friction::NAME && report.simulated);
+    Ok(Decision { solid, contact, friction, reports })
 }

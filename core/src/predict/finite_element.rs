@@ -3,10 +3,15 @@
 use nalgebra::{Point3, Vector3};
 
 use super::types::{ContactReport, ContactState, PredictError, SolverReport};
-use crate::equilibrium::{ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Tool, Wall};
+use crate::effects::pressure::Pressure;
+use crate::equilibrium::friction::FrictionError;
+use crate::equilibrium::settled::Settled;
+use crate::equilibrium::{
+    Addition, ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Tool, Wall,
+};
 use crate::mesh::disc::DiscGeometry;
 use crate::mesh::sample::locate;
-use crate::mesh::wall::{WallDivision, WallError, WallTopology};
+use crate::mesh::wall::{Place, WallDivision, WallError, WallTopology};
 use crate::patch::Patch;
 use crate::progress::Progress;
 use crate::solve::newton::Workspace;
@@ -71,7 +76,12 @@ impl Resolution {
                 LayerKind::Sclera => self.sclera_elements,
             })
             .collect();
-        WallDivision { core_cells: self.core_cells, rings: self.rings, elements_per_layer }
+        WallDivision {
+            core_cells: self.core_cells,
+            rings: self.rings,
+            elements_per_layer,
+            layers_above_interface: None,
+        }
     }
 }
 
@@ -92,6 +102,8 @@ pub struct ContactEstimate {
 const FIRST_ELEMENT_PER_CONTACT: f64 = 2.0;
 /// Smallest contact radius that a mesh is made for, in needle radii.
 const SMALLEST_CONTACT: f64 = 0.05;
+/// Share of the normal force on slipping tissue above which a contact counts as slipping.
+const SLIPPING_FROM: f64 = 0.5;
 /// The answer of a finite-element level, patch frame.
 pub struct FiniteElementAnswer {
     /// Displacement of each node of the patch (mm).
@@ -132,6 +144,10 @@ pub struct Problem<'a> {
     pub motion: Motion,
     /// Which solid energy.
     pub solid: Solid,
+    /// Coulomb's coefficient, where friction is simulated.
+    pub friction_coefficient: Option<f64>,
+    /// Change of the eye's pressure (kPa), where it is simulated.
+    pub pressure_kpa: Option<f64>,
 }
 
 impl Problem<'_> {
@@ -168,11 +184,31 @@ impl Problem<'_> {
         let mut positions = wall.displaced(start);
         wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm));
         progress.stage("equilibrium");
-        let equilibrium = wall
-            .solve(&Load { motion: &motion, touch_mm, additions: &[] }, positions, workspace, progress)
-            .map_err(|cause| PredictError::Solver { level, cause })?;
+        let pressure = self.pressure_kpa.map(|pressure_kpa| Pressure { pressure_kpa });
+        let additions: Vec<Addition> = pressure.iter().map(|effect| Addition { effect, place: Place::Faces }).collect();
+        let load = Load { motion: &motion, touch_mm, additions: &additions };
+        let failed = |cause| PredictError::Solver { level, cause };
+        let (equilibrium, rubbing) = match self.friction_coefficient {
+            None => (wall.solve(&load, positions, workspace, progress).map_err(failed)?, None),
+            Some(coefficient) => {
+                let (equilibrium, rubbing) = wall
+                    .solve_with_friction(&load, coefficient, positions, workspace, progress)
+                    .map_err(|cause| match cause {
+                        FrictionError::Newton(cause) => failed(cause),
+                        cause @ FrictionError::NotSettled { .. } => PredictError::Friction { level, cause },
+                    })?;
+                (equilibrium, Some(rubbing))
+            }
+        };
         progress.stage("surface");
-        Ok(self.answer(&wall, &equilibrium, touch_mm))
+        let mut answer = self.answer(&wall, resolution, &equilibrium, touch_mm);
+        if let Some(rubbing) = rubbing.filter(|_| answer.contact.state == ContactState::Touching) {
+            answer.contact.slipping_share = Some(rubbing.slipping_share);
+            if rubbing.slipping_share > SLIPPING_FROM {
+                answer.contact.state = ContactState::Slipping;
+            }
+        }
+        Ok(answer)
     }
 
     /// The meshed wall under the needle.
@@ -185,7 +221,18 @@ impl Problem<'_> {
         resolution: &Resolution,
         mesh: &MeshSize,
     ) -> Result<Wall<'b>, WallError> {
-        Wall::new(topology, &self.patch.surface, self.tissue, mesh, self.solid, resolution.contact, self.tool)
+        let mut wall =
+            Wall::new(topology, &self.patch.surface, self.tissue, mesh, self.solid, resolution.contact, self.tool)?;
+        if let (Some(settled), Some(pressure_kpa)) = (self.settled(resolution), self.pressure_kpa) {
+            wall.settle(&self.patch.surface, &settled, pressure_kpa);
+        }
+        Ok(wall)
+    }
+
+    /// Where the wall stands far from the needle, if the eye's pressure has changed.
+    fn settled(&self, resolution: &Resolution) -> Option<Settled> {
+        let yields = |kind| kind != LayerKind::Sclera || resolution.sclera_elements > 0;
+        self.pressure_kpa.map(|pressure_kpa| Settled::new(self.tissue, pressure_kpa, self.solid, yields))
     }
 
     /// The motion with a guess of its travel on this wall, and the travel at first touch (mm).
@@ -204,13 +251,27 @@ impl Problem<'_> {
         (motion, touch_mm)
     }
 
+    /// Displacement of a surface point far from the needle (mm).
+    fn sunk(&self, settled: &Settled, [x, y]: [f64; 2]) -> Vector3<f64> {
+        let column = self.patch.surface.column(x, y);
+        column.inward.into_inner() * settled.sink_mm(&column, 0.0)
+    }
+
     /// The equilibrium read off at the patch's nodes.
-    pub(crate) fn answer(&self, wall: &Wall, equilibrium: &Equilibrium, touch_mm: f64) -> FiniteElementAnswer {
+    pub(crate) fn answer(
+        &self,
+        wall: &Wall,
+        resolution: &Resolution,
+        equilibrium: &Equilibrium,
+        touch_mm: f64,
+    ) -> FiniteElementAnswer {
+        let settled = self.settled(resolution);
+        let beyond = |parameter| settled.as_ref().map_or_else(Vector3::zeros, |settled| self.sunk(settled, parameter));
         let displacement: Vec<f64> =
             equilibrium.positions.iter().zip(&wall.geometry.rest).map(|(current, rest)| current - rest).collect();
         let node = |&parameter: &[f64; 2]| match locate(wall.topology(), &wall.geometry, parameter) {
             Some(sample) => sample.interpolate(&displacement),
-            None => Vector3::zeros(),
+            None => beyond(parameter),
         };
         let summary = wall.contact_summary(&equilibrium.positions);
         FiniteElementAnswer {
@@ -241,6 +302,7 @@ fn report(summary: &ContactSummary, max_strain: f64) -> ContactReport {
         max_pressure_kpa: summary.max_pressure_kpa,
         max_penetration_mm: summary.max_penetration_mm.max(0.0),
         max_strain,
+        slipping_share: None,
     }
 }
 

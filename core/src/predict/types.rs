@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 use thiserror::Error;
 
 use super::expected_error::ExpectedError;
+use crate::equilibrium::friction::FrictionError;
 use crate::mesh::wall::WallError;
 use crate::needle::Needle;
 use crate::patch::PatchError;
@@ -76,6 +77,8 @@ pub enum ContactState {
     Clear,
     /// They do.
     Touching,
+    /// They do, and most of the normal force acts where the tissue slides along the needle; told only where friction is simulated.
+    Slipping,
 }
 
 /// Where the needle ends up and what holds it.
@@ -102,6 +105,8 @@ pub struct ContactReport {
     pub max_penetration_mm: f64,
     /// Largest principal stretch minus one, in magnitude, anywhere in the tissue (an estimate at level `linear`).
     pub max_strain: f64,
+    /// Share of the normal force that acts where the tissue slides along the needle, 0 to 1; where friction is simulated.
+    pub slipping_share: Option<f64>,
 }
 
 /// One effect: simulated or not, and why.
@@ -242,6 +247,14 @@ pub enum PredictError {
         level: &'static str,
         /// The last attempt's failure.
         cause: NewtonError,
+    },
+    /// Friction was not found.
+    #[error("no equilibrium at level `{level}`: {cause}")]
+    Friction {
+        /// The level.
+        level: &'static str,
+        /// What failed.
+        cause: FrictionError,
     },
     /// The linear level's preparation or contact law failed.
     #[error("level `linear`: {0}")]

@@ -51,7 +51,7 @@ impl Simulation<'_> {
                 (true, Some(0.0)) => "no force is applied",
                 (true, _) => "the needle does not reach the surface",
             };
-            (question.at_rest(self.decision.clone(), why), false)
+            (question.at_rest(self.decision.clone(), None, why), false)
         };
         self.needle.tip_mm = prediction.needle.tip_mm;
         self.needle.orientation = request.needle.orientation;
@@ -80,7 +80,7 @@ impl Simulation<'_> {
                 };
                 if let (Level::Reference, Some(linear)) = (question.request.level, linear.filter(|_| !remembers)) {
                     // The finer mesh is made for the contact that `coarse` finds, as in a single prediction.
-                    let found = question.coarse(linear, &self.decision, &mut self.coarse, progress)?.estimate;
+                    let found = question.coarse(linear, &self.decision, None, &mut self.coarse, progress)?.estimate;
                     around = ContactEstimate { center: found.center, radius_mm: found.radius_mm, ..around };
                 }
                 self.settled = None;
@@ -100,7 +100,7 @@ impl Simulation<'_> {
         step_s: f64,
         progress: &mut dyn Progress,
     ) -> Result<(Prediction, bool), PredictError> {
-        let problem = question.problem(&self.decision);
+        let problem = question.problem(&self.decision, None);
         let aim = self.aim(question, linear, &problem, progress)?;
         progress.stage("mesh");
         let topology = self.topology.clone();
@@ -138,7 +138,7 @@ impl Simulation<'_> {
             history.commit(&wall, &equilibrium.positions, step_s);
         }
         progress.stage("surface");
-        let mut answer = problem.answer(&wall, &equilibrium, touch_mm);
+        let mut answer = problem.answer(&wall, self.resolution, &equilibrium, touch_mm);
         if withdrawn {
             answer.travel_mm = 0.0;
         } else {

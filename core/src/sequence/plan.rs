@@ -8,9 +8,10 @@ use nalgebra::Vector3;
 use super::{Sequence, SequenceError, Step, TIME_STEP};
 use crate::needle::{Body, Needle};
 use crate::predict::choice::Expected;
+use crate::predict::choice::friction::Sliding;
 use crate::predict::finite_element::ContactEstimate;
 use crate::predict::linear::LinearAnswer;
-use crate::predict::{Control, CutOrGrid, PredictError, PreparedScene, Question, Request};
+use crate::predict::{Control, CutOrGrid, EffectReport, PredictError, PreparedScene, Question, Request};
 use crate::progress::Progress;
 use crate::solve::newton::NewtonError;
 
@@ -20,6 +21,8 @@ pub(super) struct Plan {
     pub contacts: Vec<Option<ContactEstimate>>,
     /// The deepest contact.
     pub deepest: Expected,
+    /// What is decided of the eye's pressure.
+    pub pressure: EffectReport,
     /// The shortest time in which the load changes between two steps (s); infinite if it never does.
     pub fastest_change_s: f64,
 }
@@ -128,7 +131,7 @@ pub(super) fn pressed<'b>(question: &'b Question) -> Result<Option<LinearAnswer<
     if question.motion.force_mn == Some(0.0) {
         return Ok(None);
     }
-    question.pressed()
+    question.pressed(&question.tool)
 }
 
 /// Checks every step, in the frame of the patch under the first that loads.
@@ -150,9 +153,18 @@ pub(super) fn plan<'a>(
     };
     sequence.needle.validate().map_err(|error| at(0, error.into()))?;
     let patch = prepared.patch_for(&sequence.request(first, &sequence.needle), body).map_err(|cause| at(0, cause))?;
+    let sliding = Sliding { coefficient: prepared.scene().friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
     let mut plan = Plan {
         contacts: Vec::with_capacity(sequence.steps.len()),
-        deepest: Expected { depth_mm: 0.0, strain: 0.0 },
+        deepest: Expected { depth_mm: 0.0, strain: 0.0, sliding },
+        pressure: Question::new(
+            prepared,
+            &sequence.request(first, &sequence.needle),
+            body,
+            CutOrGrid::Grid(patch.patch()),
+        )
+        .sink()
+        .report,
         fastest_change_s: f64::INFINITY,
     };
     let mut needle = sequence.needle;
@@ -174,7 +186,8 @@ pub(super) fn plan<'a>(
             }
             if linear.depth_mm > plan.deepest.depth_mm {
                 let strain = linear.depth_mm / question.yielding_mm();
-                plan.deepest = Expected { depth_mm: linear.depth_mm, strain };
+                let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
+                plan.deepest = Expected { depth_mm: linear.depth_mm, strain, sliding };
             }
         }
         let load = linear.as_ref().map(|linear| (linear.depth_mm, linear.center));

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use super::Sequence;
 use super::plan::Plan;
 use crate::effects::viscoelasticity::Network;
-use crate::effects::{inertia, viscoelasticity};
+use crate::effects::{adhesion, friction, inertia, pressure, viscoelasticity};
 use crate::predict::choice::{Decision, decide as decide_static};
 use crate::predict::{EffectChoice, EffectReport, PredictError, PreparedScene};
 use crate::tissue::{LayerKind, Tissue};
@@ -50,6 +50,9 @@ pub(super) fn slowest_period_s(tissue: &Tissue) -> f64 {
     4.0 * crossing_s
 }
 
+/// Effects of single equilibria that a sequence leaves out, and says so.
+const STATIC_ONLY: [&str; 3] = [friction::NAME, pressure::NAME, adhesion::NAME];
+
 /// Decides for the whole sequence.
 ///
 /// # Errors
@@ -60,7 +63,17 @@ pub(super) fn decide(
     plan: &Plan,
 ) -> Result<(Decision, Rates), PredictError> {
     let tissue = &prepared.scene().tissue;
-    let mut decision = decide_static(&sequence.effects, sequence.level, plan.deepest)?;
+    if let EffectChoice::Named(names) = &sequence.effects
+        && let Some(name) = names.iter().find(|name| STATIC_ONLY.contains(&name.as_str()))
+    {
+        return Err(PredictError::Effect { name: name.clone(), problem: "is not simulated in a sequence".to_owned() });
+    }
+    let mut decision = decide_static(&sequence.effects, sequence.level, plan.deepest, &plan.pressure)?;
+    decision.friction = false;
+    for report in decision.reports.iter_mut().filter(|report| STATIC_ONLY.contains(&report.name) && report.simulated) {
+        report.simulated = false;
+        report.reason += "; not simulated in a sequence";
+    }
     let change_s = plan.fastest_change_s;
     let networks = networks(tissue);
     let borne: f64 = networks.iter().map(|network| network.borne(change_s)).sum();

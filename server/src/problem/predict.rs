@@ -32,7 +32,9 @@ fn wire_field(field: &str) -> String {
         return format!("scene.pose.position_mm{index}");
     }
     match field.split(['.', '[']).next() {
-        Some("surface" | "tissue") => format!("scene.{field}"),
+        Some("surface" | "tissue" | "friction_coefficient" | "pressure_kpa" | "rest_pressure_kpa") => {
+            format!("scene.{field}")
+        }
         Some("scene_from_patch") => "scene.pose.orientation_xyzw".to_owned(),
         _ => field.to_owned(),
     }
@@ -93,7 +95,9 @@ pub fn from_predict(error: PredictError) -> Problem {
         PredictError::Solver { cause: NewtonError::Interrupted { .. }, .. } => {
             Problem::new(Kind::TookTooLong, "The work was stopped at the time limit of the server.")
         }
-        PredictError::Solver { .. } | PredictError::Linear(_) => Problem::new(Kind::NoEquilibrium, detail),
+        PredictError::Solver { .. } | PredictError::Friction { .. } | PredictError::Linear(_) => {
+            Problem::new(Kind::NoEquilibrium, detail)
+        }
     }
 }
 

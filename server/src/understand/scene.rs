@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::mesh_file::{MeshFormat, read_mesh};
 use retina_core::surface::{EYE_RADIUS, MeshError, PIT_DEPTH, PIT_SIGMA, TriangleMesh};
@@ -55,6 +56,9 @@ pub fn scene(spec: &SceneSpec) -> Result<Scene, Problem> {
         surface,
         tissue: spec.tissue.as_ref().map_or_else(Tissue::default, tissue),
         scene_from_patch: spec.pose.as_ref().map_or(Ok(Isometry3::identity()), pose)?,
+        friction_coefficient: spec.friction_coefficient.unwrap_or(FRICTION_COEFFICIENT.default),
+        pressure_kpa: spec.pressure_kpa.unwrap_or(EYE_PRESSURE.default),
+        rest_pressure_kpa: spec.rest_pressure_kpa.unwrap_or(EYE_PRESSURE.default),
     };
     scene.validate().map_err(|error| from_out_of_range(field(&error.field, spec), &error))?;
     Ok(scene)

@@ -78,6 +78,9 @@ pub struct ContactAnswer {
     pub max_pressure_kpa: f64,
     /// Deepest penetration of the needle that the contact law left, µm.
     pub max_penetration_um: f64,
+    /// Share of the normal force that acts where the tissue slides along the needle, 0 to 1; told where `friction` is simulated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slipping_share: Option<f64>,
 }
 
 /// Whether needle and retina touch.
@@ -88,6 +91,8 @@ pub enum ContactWord {
     Clear,
     /// They do.
     Touching,
+    /// They do, and most of the normal force acts where the tissue slides along the needle.
+    Slipping,
 }
 
 /// How accurate the answer is.
@@ -205,11 +210,13 @@ impl From<&ContactReport> for ContactAnswer {
             state: match contact.state {
                 ContactState::Clear => ContactWord::Clear,
                 ContactState::Touching => ContactWord::Touching,
+                ContactState::Slipping => ContactWord::Slipping,
             },
             area_mm2: contact.area_mm2,
             max_strain: contact.max_strain,
             max_pressure_kpa: contact.max_pressure_kpa,
             max_penetration_um: contact.max_penetration_mm * 1e3,
+            slipping_share: contact.slipping_share,
         }
     }
 }

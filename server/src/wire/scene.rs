@@ -22,6 +22,15 @@ pub struct SceneSpec {
     /// Where the patch stands in the scene frame; the identity when left out. Refused for a mesh, which places its own patch.
     #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseSpec>,
+    /// Coulomb's coefficient of friction between needle and retina, 0 to 2; 0 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction_coefficient: Option<f64>,
+    /// Pressure in the eye, kPa (1 mmHg is 0.1333 kPa), 0 to 8; 2.07 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pressure_kpa: Option<f64>,
+    /// Pressure in the eye when the surface was measured, kPa, 0 to 8; 2.07 when left out. The difference of the two presses on the surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rest_pressure_kpa: Option<f64>,
 }
 
 /// What a surface is.

@@ -41,7 +41,12 @@ impl Press {
         solid: Solid,
         smoothing_mm: f64,
     ) -> Self {
-        let division = WallDivision { core_cells, rings: radii.len() - 1, elements_per_layer: sheets.1 };
+        let division = WallDivision {
+            core_cells,
+            rings: radii.len() - 1,
+            elements_per_layer: sheets.1,
+            layers_above_interface: None,
+        };
         Press {
             topology: WallTopology::new(division).expect("a topology"),
             tissue: sheets.0,

@@ -1,0 +1,272 @@
+//! The repetition that friction needs: solve, take new contact pressures and normals, solve again, until they settle.
+//!
+//! It starts from the frictionless equilibrium. The pressures of the next round are a mix of those used and those found (Irons & Tuck 1969): where the
+//! force along the motion is shared between pressure and friction, each round answers the last one's error with one of the opposite sign, and plain repetition
+//! would diverge beyond µ tan(angle) = 1. The friction itself begins with a coefficient that rises and a wide stick zone that narrows from round to round, so that no solve has to find many points' way
+//! across it at once.
+//! Not here: the energy (`effects::friction`).
+
+use nalgebra::{Point3, Vector3};
+use thiserror::Error;
+
+use super::{ATTEMPTS, Addition, Drive, Equilibrium, Load, RELATIVE_TOLERANCE, Wall};
+use crate::effect::{Effect, Local};
+use crate::effects::friction::{Friction, RubbingPoint, anchor};
+use crate::mesh::wall::Place;
+use crate::progress::Progress;
+use crate::solve::newton::{NewtonError, NewtonReport, Workspace};
+
+/// Slip from which on friction is at its limit (mm): what sticks creeps by less, a fraction of what the levels resolve.
+pub const FULL_SLIP_MM: f64 = 5e-4;
+/// Change of the pressures from one round to the next, relative to their sum, at which they count as settled. Friction is off by no more than
+/// this share.
+pub const SETTLED: f64 = 1e-3;
+/// Residual relative to the force scale at which a round stops; the last one goes on to that of every solve.
+const ROUND_TOLERANCE: f64 = 1e-3;
+/// Rounds before friction counts as not settling.
+const MAX_ROUNDS: usize = 60;
+/// Largest rise of the coefficient from one round to the next: what is held at once by a high friction is held wherever it happens to be.
+const COEFFICIENT_STEP: f64 = 0.5;
+/// Factors on the largest share of the found pressures in the next mix after a round that changed more than the last, and after one that changed less: points
+/// of a sharp edge that touch and let go in turn come to rest.
+const CALMING: f64 = 0.5;
+/// See [`CALMING`].
+const HASTENING: f64 = 1.3;
+/// Stick zone of the first round over the last one's.
+const FIRST_WIDENING: f64 = 16.0;
+/// Factor by which the stick zone narrows from round to round.
+const NARROWING: f64 = 0.25;
+/// Bounds of the share of the found pressures in the next mix.
+const MIX: (f64, f64) = (0.05, 1.0);
+
+/// Why there is no equilibrium with friction.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum FrictionError {
+    /// A solve failed.
+    #[error(transparent)]
+    Newton(#[from] NewtonError),
+    /// The pressures kept changing.
+    #[error(
+        "`friction`: the contact pressures did not settle in {rounds} rounds (they change by {change:.2e} of their sum, allowed {allowed:.0e})"
+    )]
+    NotSettled {
+        /// Rounds made.
+        rounds: usize,
+        /// Change of the pressures in the last round, relative to their sum.
+        change: f64,
+        /// Allowed change.
+        allowed: f64,
+    },
+}
+
+/// How the tissue rubs at an equilibrium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rubbing {
+    /// Share of the normal force that acts where the tissue slips, 0 to 1.
+    pub slipping_share: f64,
+    /// Force of friction on the needle (mN).
+    pub force_mn: Vector3<f64>,
+    /// Rounds until the pressures settled.
+    pub rounds: usize,
+}
+
+/// The state of the contact that friction is made from, for each quadrature point of each face.
+struct Pressed {
+    /// Normal force (mN), face after face.
+    forces_mn: Vec<f64>,
+    /// Normal of the needle's surface, patch frame; zero where nothing presses.
+    normals: Vec<Vector3<f64>>,
+}
+
+impl Pressed {
+    /// Sum of the changes of the forces since `earlier`, over their sum; 0 where nothing presses.
+    fn change_from(&self, earlier: &Pressed) -> f64 {
+        let changes = self.forces_mn.iter().zip(&earlier.forces_mn).map(|(now, before)| (now - before).abs());
+        let (change, sum): (f64, f64) = (changes.sum(), self.forces_mn.iter().sum());
+        if change > 0.0 { change / sum } else { 0.0 }
+    }
+}
+
+impl Wall<'_> {
+    /// Finds the equilibrium under `load` with friction of the coefficient `coefficient` besides.
+    ///
+    /// # Errors
+    /// [`FrictionError`].
+    pub fn solve_with_friction(
+        &self,
+        load: &Load,
+        coefficient: f64,
+        positions: Vec<f64>,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<(Equilibrium, Rubbing), FrictionError> {
+        let mut found = self.solve(load, positions, workspace, progress)?;
+        let mut total = found.newton;
+        let mut pressed = self.pressed(&found.positions);
+        let (mut last_error, mut mix) = (Vec::new(), MIX.1);
+        let mut widening = FIRST_WIDENING;
+        let mut tolerance = ROUND_TOLERANCE;
+        let (mut change, mut last_change, mut cap) = (f64::INFINITY, f64::INFINITY, MIX.1);
+        for round in 1..=MAX_ROUNDS {
+            let reached = coefficient.min(round as f64 * COEFFICIENT_STEP);
+            let settling = reached == coefficient && widening == 1.0;
+            let points = self.rubbing_points(load, reached, &pressed);
+            let friction = Friction { faces: &self.faces, points: &points, full_slip_mm: FULL_SLIP_MM * widening };
+            let rubs = [Addition { effect: &friction, place: Place::Faces }];
+            let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
+            let with_friction = Load { additions: &additions, ..*load };
+            total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
+            let mut now = self.pressed(&found.positions);
+            change = now.change_from(&pressed);
+            if settling && change <= SETTLED && tolerance > RELATIVE_TOLERANCE {
+                tolerance = RELATIVE_TOLERANCE;
+                total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
+                now = self.pressed(&found.positions);
+                change = now.change_from(&pressed);
+            }
+            if settling && change <= SETTLED {
+                let rubbing = self.rubbing(&friction, &found.positions, round);
+                return Ok((Equilibrium { newton: total, ..found }, rubbing));
+            }
+            let error: Vec<f64> = now.forces_mn.iter().zip(&pressed.forces_mn).map(|(new, used)| new - used).collect();
+            if settling && last_error.len() == error.len() {
+                cap = if change > last_change { CALMING * cap } else { (HASTENING * cap).min(MIX.1) };
+                mix = next_mix(mix, &last_error, &error).min(cap);
+            }
+            last_change = change;
+            for (used, e) in pressed.forces_mn.iter_mut().zip(&error) {
+                *used = (*used + mix * e).max(0.0);
+            }
+            for (used, new) in pressed.normals.iter_mut().zip(&now.normals) {
+                // At a sharp edge normals swing as far as pressures; where the contact is new or gone, there is nothing to mix.
+                *used = if *used == Vector3::zeros() || *new == Vector3::zeros() {
+                    *new
+                } else {
+                    (*used * (1.0 - mix) + new * mix).normalize()
+                };
+            }
+            last_error = if settling { error } else { Vec::new() };
+            if reached == coefficient {
+                widening = (widening * NARROWING).max(1.0);
+            }
+        }
+        Err(FrictionError::NotSettled { rounds: MAX_ROUNDS, change, allowed: SETTLED })
+    }
+
+    /// One more solve from an equilibrium nearby, to `tolerance` relative to the force scale: with full steps, and where they fail with a line search.
+    fn repeat(
+        &self,
+        load: &Load,
+        tolerance: f64,
+        found: &mut Equilibrium,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<NewtonReport, NewtonError> {
+        let drive = match load.motion.force_mn {
+            Some(force_mn) => Drive::Force { direction: load.motion.direction.into_inner(), force_mn },
+            None => Drive::Held,
+        };
+        let mut spent = 0;
+        let mut failure = NewtonError::Interrupted { iterations: 0 };
+        for attempt in [&ATTEMPTS[0], &ATTEMPTS[ATTEMPTS.len() - 1]] {
+            let mut positions = found.positions.clone();
+            let drive = (drive, tolerance);
+            match self.newton(&self.contact, drive, load, attempt, &mut positions, &mut spent, workspace, progress) {
+                Ok(mut report) => {
+                    report.iterations = spent;
+                    *found = self.equilibrium(load.motion, positions, report, found.load_steps, workspace);
+                    return Ok(report);
+                }
+                Err(stop @ NewtonError::Interrupted { .. }) => return Err(stop),
+                Err(error) => failure = error,
+            }
+        }
+        Err(failure)
+    }
+
+    /// Normal forces and normals of every quadrature point.
+    fn pressed(&self, positions: &[f64]) -> Pressed {
+        let contact = self.contact();
+        let stencils = &self.topology.faces;
+        let mut current = vec![0.0; 3 * stencils.group_size];
+        let count = stencils.len() * self.faces.points;
+        let mut pressed = Pressed { forces_mn: vec![0.0; count], normals: vec![Vector3::zeros(); count] };
+        let mut pose = self.tool.patch_from_needle;
+        pose.translation.vector = Vector3::from_row_slice(&positions[3 * self.topology.needle()..]);
+        for group in 0..stencils.len() {
+            stencils.gather(group, positions, &mut current);
+            let local = Local { current: &current, group, predicted: &[] };
+            for (point, state) in contact.contact_points(&local).enumerate() {
+                if state.pressure_kpa > 0.0 {
+                    let at = group * self.faces.points + point;
+                    let gradient =
+                        self.tool.body.signed_distance(&pose.inverse_transform_point(&state.position)).gradient;
+                    pressed.forces_mn[at] = state.pressure_kpa * state.area_mm2;
+                    pressed.normals[at] = (pose.rotation * gradient).normalize();
+                }
+            }
+        }
+        pressed
+    }
+
+    /// The points that rub, face by face, with their anchors.
+    fn rubbing_points(&self, load: &Load, coefficient: f64, pressed: &Pressed) -> Vec<Vec<RubbingPoint>> {
+        let stencils = &self.topology.faces;
+        let pose = &self.tool.patch_from_needle;
+        let direction = pose.inverse_transform_unit_vector(&load.motion.direction);
+        let start = self.start();
+        let face = |group: usize| -> Vec<RubbingPoint> {
+            let vertices = stencils.group(group);
+            let rest = |point: usize| -> Point3<f64> {
+                let node = |vertex: u32| Vector3::from_row_slice(&start[3 * vertex as usize..][..3]);
+                Point3::from(
+                    self.faces.values(point).iter().zip(vertices).map(|(v, &n)| node(n) * *v).sum::<Vector3<f64>>(),
+                )
+            };
+            let rubs = |&point: &usize| pressed.normals[group * self.faces.points + point] != Vector3::zeros();
+            let rubbing = |point: usize| {
+                let at = group * self.faces.points + point;
+                let anchor = anchor(self.tool.body, &pose.inverse_transform_point(&rest(point)), &direction);
+                RubbingPoint {
+                    point,
+                    limit_mn: coefficient * pressed.forces_mn[at],
+                    normal: pressed.normals[at],
+                    anchor: pose.rotation * anchor.coords,
+                }
+            };
+            (0..self.faces.points).filter(rubs).map(rubbing).collect()
+        };
+        (0..stencils.len()).map(face).collect()
+    }
+
+    /// What slips, and with what force.
+    fn rubbing(&self, friction: &Friction, positions: &[f64], rounds: usize) -> Rubbing {
+        let stencils = &self.topology.faces;
+        let n = stencils.group_size;
+        let mut current = vec![0.0; 3 * n];
+        let mut gradient = vec![0.0; 3 * n];
+        let (mut limit, mut slipping) = (0.0, 0.0);
+        for group in 0..stencils.len() {
+            stencils.gather(group, positions, &mut current);
+            let local = Local { current: &current, group, predicted: &[] };
+            friction.add_gradient(&local, &mut gradient);
+            for (point, used) in friction.used(&local) {
+                limit += point.limit_mn;
+                slipping += if used >= 1.0 { point.limit_mn } else { 0.0 };
+            }
+        }
+        let force_mn = Vector3::from_fn(|k, _| -gradient[(k + 1) * n - 1]);
+        Rubbing { slipping_share: if limit > 0.0 { slipping / limit } else { 0.0 }, force_mn, rounds }
+    }
+}
+
+/// The share of the found pressures in the next mix, from the errors of two rounds (Irons & Tuck).
+fn next_mix(mix: f64, last: &[f64], now: &[f64]) -> f64 {
+    let (mut along, mut squared) = (0.0, 0.0);
+    for (last, now) in last.iter().zip(now) {
+        let change = now - last;
+        along += last * change;
+        squared += change * change;
+    }
+    if squared > 0.0 { (-mix * along / squared).clamp(MIX.0, MIX.1) } else { mix }
+}

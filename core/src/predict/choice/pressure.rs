@@ -1,0 +1,19 @@
+//! When the eye's pressure matters: it does when it moves the surface, which it does by itself, needle or not.
+
+use super::super::types::{EffectChoice, EffectReport};
+use super::AUTO_TOLERANCE_UM;
+use super::criterion::Criterion;
+use crate::effects::pressure;
+
+/// The decision about pressure, from the change of pressure (kPa) and the sinking that linear elasticity expects of it (µm).
+pub fn report(choice: &EffectChoice, change_kpa: f64, sink_um: f64) -> EffectReport {
+    let ruled_out = (change_kpa == 0.0).then_some("the eye's pressure is that at which the surface was measured");
+    Criterion {
+        name: pressure::NAME,
+        value: sink_um.abs(),
+        threshold: AUTO_TOLERANCE_UM,
+        quantity: "the sinking of the surface under the change of pressure [µm]",
+        ruled_out,
+    }
+    .settle(choice)
+}
