@@ -170,6 +170,11 @@ impl Body {
         SignedDistance { value: reach - self.edge_radius, gradient, hessian }
     }
 
+    /// Whether the tip has no edge: half a ball.
+    pub fn is_round(&self) -> bool {
+        self.core_radius == 0.0 && self.plane_normal.0 == 0.0
+    }
+
     /// The point of the needle furthest along a needle-local direction, in needle-local coordinates, mm.
     ///
     /// `None` when the direction does not point forwards (its z part is not negative): along it the shaft has no end. Where the

@@ -211,6 +211,14 @@ impl Problem<'_> {
         Ok(answer)
     }
 
+    /// The contact's parameters: a round tip meets the tissue all at once and needs no softened approach.
+    fn contact(&self, resolution: &Resolution) -> ContactSettings {
+        match self.tool.body.is_round() {
+            true => ContactSettings { softening: 1.0, ..resolution.contact },
+            false => resolution.contact,
+        }
+    }
+
     /// The meshed wall under the needle.
     ///
     /// # Errors
@@ -222,7 +230,7 @@ impl Problem<'_> {
         mesh: &MeshSize,
     ) -> Result<Wall<'b>, WallError> {
         let mut wall =
-            Wall::new(topology, &self.patch.surface, self.tissue, mesh, self.solid, resolution.contact, self.tool)?;
+            Wall::new(topology, &self.patch.surface, self.tissue, mesh, self.solid, self.contact(resolution), self.tool)?;
         if let (Some(settled), Some(pressure_kpa)) = (self.settled(resolution), self.pressure_kpa) {
             wall.settle(&self.patch.surface, &settled, pressure_kpa);
         }
@@ -243,7 +251,7 @@ impl Problem<'_> {
                 let beyond = (estimate.travel_mm - estimate.touch_mm).max(0.0);
                 let area = std::f64::consts::PI
                     * estimate.radius_mm.max(SMALLEST_CONTACT * self.tool.body.radius_mm()).powi(2);
-                let overlap = force_mn / area / resolution.contact.softened().stiffness_kpa_per_mm;
+                let overlap = force_mn / area / self.contact(resolution).softened().stiffness_kpa_per_mm;
                 Motion { travel_mm: touch_mm + beyond + overlap, ..self.motion }
             }
             None => self.motion,
