@@ -8,14 +8,16 @@ use retina_core::range::ParameterRange;
 use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
-use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA};
+use retina_core::tissue::ranges::{
+    BOND_STRENGTH, CHOROID, FRACTURE_ENERGY, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA,
+};
 use retina_core::tissue::{Layer, Tissue};
 
 use crate::understand::{DEFAULT_GAUGE, DEFAULT_LEVEL, DEFAULT_SCENE, FORCE};
 use crate::wire::catalog::{
     GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
 };
-use crate::wire::scene::{LayerSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec};
+use crate::wire::scene::{BondSpec, LayerSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec};
 
 /// The built-in scenes, and every parameter with its range.
 pub fn scenes() -> SceneList {
@@ -105,6 +107,10 @@ fn tissue(tissue: &Tissue) -> TissueSpec {
         retina: Some(retina),
         choroid: Some(layer(&tissue.choroid)),
         sclera: Some(layer(&tissue.sclera)),
+        bond: Some(BondSpec {
+            strength_kpa: Some(tissue.bond.strength_kpa),
+            fracture_energy_mn_per_mm: Some(tissue.bond.fracture_energy_mn_per_mm),
+        }),
     }
 }
 
@@ -120,6 +126,8 @@ fn parameters() -> Vec<ParameterEntry> {
         ("scene.surface.depth_mm", &PIT_DEPTH),
         ("scene.surface.sigma_mm", &PIT_SIGMA),
         ("scene.pose.position_mm", &TIP_COORDINATE),
+        ("scene.tissue.bond.strength_kpa", &BOND_STRENGTH),
+        ("scene.tissue.bond.fracture_energy_mn_per_mm", &FRACTURE_ENERGY),
         ("scene.friction_coefficient", &FRICTION_COEFFICIENT),
         ("scene.pressure_kpa", &EYE_PRESSURE),
         ("scene.rest_pressure_kpa", &EYE_PRESSURE),

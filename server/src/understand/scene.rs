@@ -8,13 +8,13 @@ use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::mesh_file::{MeshFormat, read_mesh};
 use retina_core::surface::{EYE_RADIUS, MeshError, PIT_DEPTH, PIT_SIGMA, TriangleMesh};
 use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA};
-use retina_core::tissue::{Layer, Tissue};
+use retina_core::tissue::{Layer, RetinalBond, Tissue};
 
 use super::{DEFAULT_SCENE, rotation, unknown_name};
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::{Triangle, Vector};
 use crate::wire::request::SceneChoice;
-use crate::wire::scene::{LayerSpec, PoseSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec};
+use crate::wire::scene::{BondSpec, LayerSpec, PoseSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec};
 
 /// Name of every scene that is written out.
 const INLINE_NAME: &str = "inline";
@@ -169,6 +169,15 @@ fn tissue(spec: &TissueSpec) -> Tissue {
         retina,
         choroid: or_default(&spec.choroid, &CHOROID),
         sclera: or_default(&spec.sclera, &SCLERA),
+        bond: bond(&spec.bond.unwrap_or_default()),
+    }
+}
+
+fn bond(spec: &BondSpec) -> RetinalBond {
+    let default = RetinalBond::default();
+    RetinalBond {
+        strength_kpa: spec.strength_kpa.unwrap_or(default.strength_kpa),
+        fracture_energy_mn_per_mm: spec.fracture_energy_mn_per_mm.unwrap_or(default.fracture_energy_mn_per_mm),
     }
 }
 

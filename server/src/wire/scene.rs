@@ -93,6 +93,21 @@ pub struct TissueSpec {
     /// Sclera.
     #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub sclera: Option<LayerSpec>,
+    /// The bond between retina and choroid.
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
+    pub bond: Option<BondSpec>,
+}
+
+/// How the retina holds on to the pigment epithelium under it; a number left out is the default.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BondSpec {
+    /// Largest traction, kPa, 1 to 100; 40 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub strength_kpa: Option<f64>,
+    /// Energy that letting go costs, mN/mm (the same number in N/m), 0.06 to 0.6; 0.14 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_energy_mn_per_mm: Option<f64>,
 }
 
 /// The retina as one layer or as several.
