@@ -169,7 +169,7 @@ const POSE_FORCE_SCALE_MN: f64 = 0.01;
 /// Smallest force scale (mN): below it rounding of the tissue's stresses decides.
 const SMALLEST_FORCE_MN: f64 = 1e-7;
 /// The same in a wall under pressure, over the force of the pressure on the whole surface.
-const SMALLEST_FORCE_SHARE: f64 = 1e-6;
+const SMALLEST_FORCE_SHARE: f64 = 1e-5;
 /// What is tried, in this order: directly from the given start, then from first touch in load steps.
 const ATTEMPTS: [Attempt; 4] = [
     Attempt { load_steps: 1, globalization: Globalization::PredictedStress, max_iterations: 45 },

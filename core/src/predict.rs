@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use crate::effects::{contact, finite_strain, friction};
+use crate::effects::{adhesion, contact, finite_strain, friction};
 use crate::equilibrium::Solid;
 use crate::equilibrium::settled::Settled;
 use crate::equilibrium::{Motion, Tool};
@@ -32,6 +32,7 @@ use crate::scene::{Scene, SceneSurface};
 use crate::solve::newton;
 use beds::Beds;
 use budget::{Budget, Choice, LevelTimes};
+use choice::adhesion::Pull;
 use choice::friction::Sliding;
 use choice::{Decision, Expected, decide, pressure};
 use expected_error::{ExpectedError, Situation};
@@ -258,18 +259,30 @@ impl Question<'_> {
     ) -> Result<Prediction, PredictError> {
         let sink = self.sink();
         let sliding = Sliding { coefficient: self.prepared.scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
+        let bond = self.prepared.scene.tissue.bond;
+        let pull = Pull {
+            normal_force_mn: 0.0,
+            depth_mm: self.prepared.scene.tissue.retina_thickness_mm(),
+            strength_kpa: bond.strength_kpa,
+        };
         let linear = match self.begin(&self.raised(&sink))? {
             Begun::Pressed(linear) => linear,
             Begun::Still(why) => {
                 let strain = sink.expected_mm / self.yielding_mm();
-                let decision = self.decide(Expected { depth_mm: sink.expected_mm, strain, sliding }, &sink)?;
+                let decision = self.decide(Expected { depth_mm: sink.expected_mm, strain, sliding, pull }, &sink)?;
                 return Ok(self.at_rest(decision, sink.change_kpa, why));
             }
         };
         let strain = linear.depth_mm / self.yielding_mm();
         let moved_mm = linear.depth_mm + sink.expected_mm;
         let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
-        let expected = Expected { depth_mm: moved_mm, strain: moved_mm / self.yielding_mm(), sliding };
+        let [x, y] = linear.press.touch.parameter;
+        let pull = Pull {
+            normal_force_mn: linear.normal_force_mn,
+            depth_mm: pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
+            ..pull
+        };
+        let expected = Expected { depth_mm: moved_mm, strain: moved_mm / self.yielding_mm(), sliding, pull };
         let decision = self.decide(expected, &sink)?;
         if !decision.contact {
             return Ok(self.at_rest(decision, sink.change_kpa, "contact is not simulated"));
@@ -408,6 +421,7 @@ impl Question<'_> {
                 max_penetration_mm: 0.0,
                 max_strain: strain,
                 slipping_share: None,
+                bond_damage: None,
             },
             solver: SolverReport::default(),
             estimate: self.estimate(linear),
@@ -448,6 +462,7 @@ impl Question<'_> {
             solid: decision.solid,
             friction_coefficient: decision.friction.then_some(self.prepared.scene.friction_coefficient),
             pressure_kpa,
+            bond: decision.adhesion.then_some(self.prepared.scene.tissue.bond),
         }
     }
 
@@ -459,7 +474,7 @@ impl Question<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
-        let topology = shared_topology(COARSE.division(&self.prepared.scene.tissue))?;
+        let topology = shared_topology(COARSE.division(&self.prepared.scene.tissue, decision.adhesion))?;
         let (_, solver) = match &mut workspace.coarse {
             Some(kept) if Arc::ptr_eq(&kept.0, &topology) => kept,
             slot => {
@@ -484,7 +499,7 @@ impl Question<'_> {
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
         let coarse = self.coarse(linear, decision, change_kpa, workspace, progress)?;
-        let topology = shared_topology(resolution.division(&self.prepared.scene.tissue))?;
+        let topology = shared_topology(resolution.division(&self.prepared.scene.tissue, decision.adhesion))?;
         let mut solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
         let mut bench =
             Bench { level: Level::Reference.name(), resolution, topology: &topology, workspace: &mut solver };
@@ -503,7 +518,7 @@ impl Question<'_> {
     /// The answer without contact: the surface at rest, or where the pressure moves it.
     pub(crate) fn at_rest(&self, mut decision: Decision, change_kpa: Option<f64>, reason: &str) -> Prediction {
         for report in &mut decision.reports {
-            if [contact::NAME, friction::NAME].contains(&report.name) {
+            if [contact::NAME, friction::NAME, adhesion::NAME].contains(&report.name) {
                 report.simulated = false;
                 report.reason = reason.to_owned();
             }
@@ -521,6 +536,7 @@ impl Question<'_> {
                 max_penetration_mm: 0.0,
                 max_strain: settled.as_ref().map_or(0.0, Settled::max_strain),
                 slipping_share: None,
+                bond_damage: None,
             },
             solver: SolverReport::default(),
             estimate: ContactEstimate { center: [0.0; 2], radius_mm: 0.0, touch_mm: 0.0, travel_mm: 0.0 },

@@ -3,7 +3,7 @@
 //! Contract: a [`Tissue`] lists its layers from the vitreous outwards; [`Tissue::validate`] holds every number against the ranges of
 //! [`ranges`]. Units: mm, kPa; Poisson's ratio is a pure number.
 //!
-//! Not here: where the layers lie in space (`surface`), the energy of the material (`effect`), adhesion between layers. Published moduli of the retina span 0.9 to 30 kPa by method, so every number is a scene parameter and none a constant.
+//! Not here: where the layers lie in space (`surface`), the energy of the material (`effect`). Published moduli of the retina span 0.9 to 30 kPa by method, so every number is a scene parameter and none a constant.
 
 pub mod ranges;
 pub mod rate;
@@ -82,6 +82,21 @@ pub struct NamedLayer {
     pub layer: Layer,
 }
 
+/// How the retina holds on to the pigment epithelium under it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RetinalBond {
+    /// Largest traction, kPa.
+    pub strength_kpa: f64,
+    /// Energy that letting go costs, mN/mm (the same number in N/m).
+    pub fracture_energy_mn_per_mm: f64,
+}
+
+impl Default for RetinalBond {
+    fn default() -> Self {
+        Self { strength_kpa: ranges::BOND_STRENGTH.default, fracture_energy_mn_per_mm: ranges::FRACTURE_ENERGY.default }
+    }
+}
+
 /// The eye wall, from the vitreous outwards.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tissue {
@@ -95,6 +110,8 @@ pub struct Tissue {
     pub sclera: Layer,
     /// What depends on time.
     pub rate: RateProperties,
+    /// The bond between retina and choroid.
+    pub bond: RetinalBond,
 }
 
 /// Young's moduli of five layers of the rabbit retina in vivo, from the vitreous outwards, kPa (PMC5783626, acoustic radiation
@@ -110,6 +127,7 @@ impl Default for Tissue {
             choroid: ranges::CHOROID.default_layer(),
             sclera: ranges::SCLERA.default_layer(),
             rate: RateProperties::default(),
+            bond: RetinalBond::default(),
         }
     }
 }
@@ -157,6 +175,9 @@ impl Tissue {
             };
             layer.validate(&kind.path(), allowed)?;
         }
+        ranges::BOND_STRENGTH.check("tissue.bond.strength_kpa", self.bond.strength_kpa)?;
+        let energy = self.bond.fracture_energy_mn_per_mm;
+        ranges::FRACTURE_ENERGY.check("tissue.bond.fracture_energy_mn_per_mm", energy)?;
         ranges::RETINA.thickness.check("tissue.retina.thickness_mm", self.retina_thickness_mm())?;
         self.rate.validate()
     }

@@ -10,7 +10,9 @@ use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::sequence::TIME_STEP;
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
-use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA};
+use retina_core::tissue::ranges::{
+    BOND_STRENGTH, CHOROID, FRACTURE_ENERGY, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA,
+};
 use retina_core::tissue::rate::{DENSITY, PronyTerm, RELAXATION_SHARE, RELAXATION_TIME, RateProperties, VITREOUS_DRAG};
 use retina_core::tissue::{Layer, Tissue};
 
@@ -19,7 +21,7 @@ use crate::wire::catalog::{
     GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
 };
 use crate::wire::scene::{
-    LayerSpec, PronyTermSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec,
+    BondSpec, LayerSpec, PronyTermSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec,
 };
 
 /// The built-in scenes, and every parameter with its range.
@@ -110,6 +112,10 @@ fn tissue(tissue: &Tissue) -> TissueSpec {
         retina: Some(retina),
         choroid: Some(layer(&tissue.choroid)),
         sclera: Some(layer(&tissue.sclera)),
+        bond: Some(BondSpec {
+            strength_kpa: Some(tissue.bond.strength_kpa),
+            fracture_energy_mn_per_mm: Some(tissue.bond.fracture_energy_mn_per_mm),
+        }),
         rate: Some(rate(&tissue.rate)),
     }
 }
@@ -142,6 +148,8 @@ fn parameters() -> Vec<ParameterEntry> {
         ("scene.tissue.rate.density_kg_per_mm3", &DENSITY),
         ("scene.tissue.rate.vitreous_drag_kpa_s_per_mm", &VITREOUS_DRAG),
         ("steps[].time_s", &TIME_STEP),
+        ("scene.tissue.bond.strength_kpa", &BOND_STRENGTH),
+        ("scene.tissue.bond.fracture_energy_mn_per_mm", &FRACTURE_ENERGY),
         ("scene.friction_coefficient", &FRICTION_COEFFICIENT),
         ("scene.pressure_kpa", &EYE_PRESSURE),
         ("scene.rest_pressure_kpa", &EYE_PRESSURE),

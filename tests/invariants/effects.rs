@@ -9,7 +9,7 @@ use retina_core::predict::{
 };
 use retina_core::scene::Scene;
 use retina_core::scene::conditions::MMHG_KPA;
-use retina_core::tissue::{Layer, Tissue};
+use retina_core::tissue::{Layer, RetinalBond, Tissue};
 use retina_tests::tolerance::BALANCE;
 
 use crate::support::{FAST, ask, built_in, largest_um, requests, straight};
@@ -142,9 +142,12 @@ fn auto_rubs_where_the_force_leans_and_neglects_little_elsewhere() {
         let auto = ask(&scene, &leaning(Level::Coarse, 0.5, angle_deg)).unwrap();
         let report = auto.effects.iter().find(|effect| effect.name == "friction").unwrap();
         assert_eq!(report.simulated, expected, "µ {coefficient} {angle_deg}°: {report:?}");
-        let all = Request { effects: EffectChoice::All, ..leaning(Level::Coarse, 0.5, angle_deg) };
+        let all = Request { effects: all_but("adhesion"), ..leaning(Level::Coarse, 0.5, angle_deg) };
         let all = ask(&scene, &all).unwrap();
-        let without = Request { effects: all_but("friction"), ..leaning(Level::Coarse, 0.5, angle_deg) };
+        let without = Request {
+            effects: EffectChoice::Named(["finite_strain", "contact"].map(str::to_owned).to_vec()),
+            ..leaning(Level::Coarse, 0.5, angle_deg)
+        };
         let without = ask(&scene, &without).unwrap();
         let off = |a: &Prediction, b: &Prediction| {
             a.vertices.iter().zip(&b.vertices).map(|(a, b)| (a - b).norm() * 1e3).fold(0.0, f64::max)
@@ -279,7 +282,7 @@ fn friction_is_found_over_the_working_range() {
             let plain = built_in(name);
             for request in requests(&plain, seed, 8) {
                 asked += 1;
-                let all = Request { level: Level::Coarse, effects: EffectChoice::All, ..request };
+                let all = Request { level: Level::Coarse, effects: all_but("adhesion"), ..request };
                 // What does not converge without friction is not friction's to answer for.
                 let Ok(without) = ask(&plain, &all) else { continue };
                 let with = match ask(&rough(name, coefficient), &all) {
@@ -312,4 +315,74 @@ fn friction_is_found_over_the_working_range() {
             "µ {coefficient}: {refused} of {asked} refused"
         );
     }
+}
+
+/// Damage that a few points of a coarse interface, whose tractions swing about the smooth ones, take without anything letting go.
+const UNHARMED: f64 = 0.02;
+
+#[test]
+fn a_strong_bond_is_as_good_as_none_and_a_weak_one_lets_go() {
+    let bonded = |strength_kpa: f64, fracture_energy_mn_per_mm: f64| {
+        changed("flat", |scene| scene.tissue.bond = RetinalBond { strength_kpa, fracture_energy_mn_per_mm })
+    };
+    for (request, name) in [(straight(Level::Coarse, 1.0), "straight"), (leaning(Level::Coarse, 0.5, 30.0), "leaning")]
+    {
+        let mut last_um = 0.0;
+        for (strength_kpa, expected) in [(40.0, false), (5.0, false), (1.0, true)] {
+            let scene = bonded(strength_kpa, 0.06);
+            let auto = ask(&scene, &request).unwrap();
+            let report = auto.effects.iter().find(|effect| effect.name == "adhesion").unwrap();
+            let all = Request { effects: EffectChoice::All, ..request.clone() };
+            let all = ask(&scene, &all).unwrap_or_else(|e| panic!("{name} {strength_kpa} kPa: {e}"));
+            let without = ask(&scene, &Request { effects: all_but("adhesion"), ..request.clone() }).unwrap();
+            let off_um =
+                all.vertices.iter().zip(&without.vertices).map(|(a, b)| (a - b).norm() * 1e3).fold(0.0, f64::max);
+            let damage = all.contact.bond_damage.unwrap();
+            println!(
+                "{name}, bond of {strength_kpa} kPa: expected traction {:.2} of {:.2} kPa, damage {damage:.3}, moves a node by {off_um:.3} µm, {} iterations (without {})",
+                report.value.unwrap(),
+                report.threshold.unwrap(),
+                all.solver.iterations,
+                without.solver.iterations
+            );
+            assert!(simulated(&all, "adhesion") && !simulated(&without, "adhesion"));
+            assert_eq!(without.contact.bond_damage, None);
+            assert_eq!(report.simulated, expected, "{name} {strength_kpa}: {report:?}");
+            if !expected {
+                assert!(damage < UNHARMED && off_um < 1.0, "{name} {strength_kpa}: neglected, and yet {off_um} µm");
+            }
+            assert!(off_um >= last_um - 1e-3, "a weaker bond gives way further");
+            last_um = off_um;
+        }
+        assert!(last_um > 0.0);
+    }
+}
+
+#[test]
+fn where_auto_leaves_the_bond_out_it_would_have_held() {
+    let mut compared = 0;
+    for (name, seed) in Scene::built_in_names().iter().zip(30..) {
+        for (strength_kpa, request) in [3.0, 8.0, 20.0, 40.0].into_iter().zip(requests(&built_in(name), seed, 4)) {
+            let scene = changed(name, |scene| scene.tissue.bond.strength_kpa = strength_kpa);
+            let request = Request { level: Level::Coarse, ..request };
+            let Ok(auto) = ask(&scene, &request) else { continue };
+            let Ok(all) = ask(&scene, &Request { effects: EffectChoice::All, ..request.clone() }) else { continue };
+            let report = auto.effects.iter().find(|effect| effect.name == "adhesion").unwrap();
+            let damage = all.contact.bond_damage.unwrap();
+            let without = ask(&scene, &Request { effects: all_but("adhesion"), ..request.clone() }).unwrap();
+            let off_um =
+                all.vertices.iter().zip(&without.vertices).map(|(a, b)| (a - b).norm() * 1e3).fold(0.0, f64::max);
+            println!(
+                "{name}, {strength_kpa} kPa: expected {:.3} kPa, damage {damage:.4}, moves a node by {off_um:.3} µm, auto {}",
+                report.value.unwrap(),
+                report.simulated
+            );
+            compared += 1;
+            assert!(
+                report.simulated || (damage < UNHARMED && off_um < 1.0),
+                "{name} {strength_kpa}: {report:?} {damage}: {request:?}"
+            );
+        }
+    }
+    assert!(compared >= 10, "{compared} of 12");
 }

@@ -77,11 +77,7 @@ impl Bond {
 
     /// Share of the strength that is lost for good after the largest opening `largest` (mm): 0 intact, 1 parted.
     pub fn damage(&self, largest: f64) -> f64 {
-        if largest <= self.onset_mm() {
-            0.0
-        } else {
-            1.0 - self.softening(largest) / (self.stiffness_kpa_per_mm * largest)
-        }
+        if largest <= self.onset_mm() { 0.0 } else { 1.0 - self.softening(largest) / self.strength_kpa }
     }
 }
 

@@ -115,6 +115,8 @@ impl Body {
                 upper += 1;
             }
             match (upper.checked_sub(1).map(|lower| sections[lower]), sections.get(upper)) {
+                // The outermost section's area is the outermost radius's but for rounding where the needle is round.
+                (Some((last, height)), None) if area <= last * (1.0 + ALIGNED) => height,
                 (_, None) => f64::INFINITY,
                 (None, Some(&(_, height))) => height,
                 (Some((a0, h0)), Some(&(a1, h1))) => h0 + (area - a0) / (a1 - a0) * (h1 - h0),

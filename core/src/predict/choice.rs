@@ -1,12 +1,14 @@
 //! Which effects a request calls for, and why. Solid and contact here, every other effect's criterion in a file of its own.
 
+pub mod adhesion;
 mod criterion;
 pub mod friction;
 pub mod pressure;
 
 use super::types::{EffectChoice, EffectReport, Level, PredictError};
-use crate::effects::{EFFECT_NAMES, contact, elasticity, finite_strain, inertia, viscoelasticity};
+use crate::effects::{self, EFFECT_NAMES, contact, elasticity, finite_strain, inertia, viscoelasticity};
 use crate::equilibrium::Solid;
+use adhesion::Pull;
 use friction::Sliding;
 
 /// Error that `auto` accepts for leaving an effect out (µm): a tenth of the best published tool-to-layer error (9 µm).
@@ -24,6 +26,8 @@ pub struct Decision {
     pub contact: bool,
     /// Whether needle and tissue rub.
     pub friction: bool,
+    /// Whether the retina can come off.
+    pub adhesion: bool,
     /// The report, in the order of [`EFFECT_NAMES`].
     pub reports: Vec<EffectReport>,
 }
@@ -37,6 +41,8 @@ pub struct Expected {
     pub strain: f64,
     /// How the needle slides.
     pub sliding: Sliding,
+    /// How it pulls at the retina's bond.
+    pub pull: Pull,
 }
 
 /// Decides for `choice` at `level`; `pressure` is what was decided about it before anything was pressed.
@@ -102,10 +108,12 @@ pub fn decide(
         ),
         friction::report(choice, level, contact, &expected.sliding),
         pressure.clone(),
+        adhesion::report(choice, level, contact, &expected.pull),
         plain(viscoelasticity::NAME, false, STATIC),
         plain(inertia::NAME, false, STATIC),
     ];
     let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
-    let friction = reports.iter().any(|report| report.name == crate::effects::friction::NAME && report.simulated);
-    Ok(Decision { solid, contact, friction, reports })
+    let is_on = |name: &str| reports.iter().any(|report| report.name == name && report.simulated);
+    let (friction, adhesion) = (is_on(effects::friction::NAME), is_on(effects::adhesion::NAME));
+    Ok(Decision { solid, contact, friction, adhesion, reports })
 }

@@ -12,7 +12,7 @@ use crate::needle::{Gauge, NeedleShape, Tip};
 use crate::scene::{Scene, SceneSurface};
 
 /// Upper ends of the bins of mean strain; the last bin has none.
-pub const STRAIN_BINS: [f64; 2] = [0.05, 0.2];
+pub const STRAIN_BINS: [f64; 1] = [0.1];
 /// Number of bins.
 pub const BINS: usize = STRAIN_BINS.len() + 1;
 /// Gauges between which needles were sampled, thin to thick.

@@ -3,6 +3,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::types::{ContactReport, ContactState, PredictError, SolverReport};
+use crate::effect::Local;
+use crate::effects::adhesion::{Adhesion, Bond, Interface, STIFFNESS_KPA_PER_MM};
 use crate::effects::pressure::Pressure;
 use crate::equilibrium::friction::FrictionError;
 use crate::equilibrium::settled::Settled;
@@ -15,7 +17,7 @@ use crate::mesh::wall::{Place, WallDivision, WallError, WallTopology};
 use crate::patch::Patch;
 use crate::progress::Progress;
 use crate::solve::newton::Workspace;
-use crate::tissue::{LayerKind, Tissue};
+use crate::tissue::{LayerKind, RetinalBond, Tissue};
 
 /// How finely a level computes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,8 +65,8 @@ pub const REFERENCE: Resolution = Resolution {
 };
 
 impl Resolution {
-    /// The mesh division for `tissue`.
-    pub fn division(&self, tissue: &Tissue) -> WallDivision {
+    /// The mesh division for `tissue`; with an interface under the retina if it is `parting`.
+    pub fn division(&self, tissue: &Tissue, parting: bool) -> WallDivision {
         let sublayers = tissue.retina.len();
         let elements_per_layer = tissue
             .layers()
@@ -76,11 +78,12 @@ impl Resolution {
                 LayerKind::Sclera => self.sclera_elements,
             })
             .collect();
+        let above = tissue.layers().iter().take_while(|named| named.kind < LayerKind::Choroid).count();
         WallDivision {
             core_cells: self.core_cells,
             rings: self.rings,
             elements_per_layer,
-            layers_above_interface: None,
+            layers_above_interface: parting.then_some(above),
         }
     }
 }
@@ -148,6 +151,8 @@ pub struct Problem<'a> {
     pub friction_coefficient: Option<f64>,
     /// Change of the eye's pressure (kPa), where it is simulated.
     pub pressure_kpa: Option<f64>,
+    /// The retina's bond, where it can part.
+    pub bond: Option<RetinalBond>,
 }
 
 impl Problem<'_> {
@@ -185,7 +190,21 @@ impl Problem<'_> {
         wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm));
         progress.stage("equilibrium");
         let pressure = self.pressure_kpa.map(|pressure_kpa| Pressure { pressure_kpa });
-        let additions: Vec<Addition> = pressure.iter().map(|effect| Addition { effect, place: Place::Faces }).collect();
+        let interface = self.bond.map(|bond| (bond, Interface::new(&topology.interface, &wall.geometry.rest)));
+        let intact =
+            vec![0.0; interface.as_ref().map_or(0, |(_, interface)| interface.points()) * topology.interface.len()];
+        let adhesion = interface.as_ref().map(|(bond, interface)| Adhesion {
+            interface,
+            bond: Bond {
+                strength_kpa: bond.strength_kpa,
+                fracture_energy_mn_per_mm: bond.fracture_energy_mn_per_mm,
+                stiffness_kpa_per_mm: STIFFNESS_KPA_PER_MM,
+            },
+            largest_mm: &intact,
+        });
+        let mut additions: Vec<Addition> =
+            pressure.iter().map(|effect| Addition { effect, place: Place::Faces }).collect();
+        additions.extend(adhesion.iter().map(|effect| Addition { effect, place: Place::Interface }));
         let load = Load { motion: &motion, touch_mm, additions: &additions };
         let failed = |cause| PredictError::Solver { level, cause };
         let (equilibrium, rubbing) = match self.friction_coefficient {
@@ -208,6 +227,7 @@ impl Problem<'_> {
                 answer.contact.state = ContactState::Slipping;
             }
         }
+        answer.contact.bond_damage = adhesion.map(|adhesion| damage(&adhesion, topology, &equilibrium.positions));
         Ok(answer)
     }
 
@@ -303,6 +323,18 @@ impl Problem<'_> {
     }
 }
 
+/// The largest damage of the bond at `positions`.
+fn damage(adhesion: &Adhesion, topology: &WallTopology, positions: &[f64]) -> f64 {
+    let mut current = vec![0.0; 3 * topology.interface.group_size];
+    let mut largest: f64 = 0.0;
+    for group in 0..topology.interface.len() {
+        topology.interface.gather(group, positions, &mut current);
+        let local = Local { current: &current, group, predicted: &[] };
+        largest = adhesion.openings(&local).fold(largest, f64::max);
+    }
+    adhesion.bond.damage(largest)
+}
+
 fn report(summary: &ContactSummary, max_strain: f64) -> ContactReport {
     ContactReport {
         state: if summary.area_mm2 > 0.0 { ContactState::Touching } else { ContactState::Clear },
@@ -311,6 +343,7 @@ fn report(summary: &ContactSummary, max_strain: f64) -> ContactReport {
         max_penetration_mm: summary.max_penetration_mm.max(0.0),
         max_strain,
         slipping_share: None,
+        bond_damage: None,
     }
 }
 

@@ -107,6 +107,8 @@ pub struct ContactReport {
     pub max_strain: f64,
     /// Share of the normal force that acts where the tissue slides along the needle, 0 to 1; where friction is simulated.
     pub slipping_share: Option<f64>,
+    /// Largest share of the strength that the retina's bond has lost anywhere, 0 intact to 1 parted; where adhesion is simulated.
+    pub bond_damage: Option<f64>,
 }
 
 /// One effect: simulated or not, and why.

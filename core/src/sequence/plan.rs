@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use super::{Sequence, SequenceError, Step, TIME_STEP};
 use crate::needle::{Body, Needle};
 use crate::predict::choice::Expected;
+use crate::predict::choice::adhesion::Pull;
 use crate::predict::choice::friction::Sliding;
 use crate::predict::finite_element::ContactEstimate;
 use crate::predict::linear::LinearAnswer;
@@ -154,9 +155,15 @@ pub(super) fn plan<'a>(
     sequence.needle.validate().map_err(|error| at(0, error.into()))?;
     let patch = prepared.patch_for(&sequence.request(first, &sequence.needle), body).map_err(|cause| at(0, cause))?;
     let sliding = Sliding { coefficient: prepared.scene().friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
+    let tissue = &prepared.scene().tissue;
+    let pull = Pull {
+        normal_force_mn: 0.0,
+        depth_mm: tissue.retina_thickness_mm(),
+        strength_kpa: tissue.bond.strength_kpa,
+    };
     let mut plan = Plan {
         contacts: Vec::with_capacity(sequence.steps.len()),
-        deepest: Expected { depth_mm: 0.0, strain: 0.0, sliding },
+        deepest: Expected { depth_mm: 0.0, strain: 0.0, sliding, pull },
         pressure: Question::new(
             prepared,
             &sequence.request(first, &sequence.needle),
@@ -187,7 +194,8 @@ pub(super) fn plan<'a>(
             if linear.depth_mm > plan.deepest.depth_mm {
                 let strain = linear.depth_mm / question.yielding_mm();
                 let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
-                plan.deepest = Expected { depth_mm: linear.depth_mm, strain, sliding };
+                let pull = Pull { normal_force_mn: linear.normal_force_mn, ..pull };
+                plan.deepest = Expected { depth_mm: linear.depth_mm, strain, sliding, pull };
             }
         }
         let load = linear.as_ref().map(|linear| (linear.depth_mm, linear.center));

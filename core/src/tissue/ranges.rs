@@ -128,3 +128,25 @@ pub const INNER_LIMITING_MEMBRANE: LayerRanges = LayerRanges {
     ),
     poisson_ratio: poisson_ratio(0.49, "[unverified] taken as that of the retina"),
 };
+
+/// Strength of the bond between retina and pigment epithelium.
+pub const BOND_STRENGTH: ParameterRange = ParameterRange {
+    name: "strength of the retina's bond",
+    unit: "kPa",
+    default: 40.0,
+    min: 1.0,
+    max: 100.0,
+    source: "[unverified] no strength is published: 2 G / 0.007 mm, the fracture energy over the length of the epithelium's villi that must be \
+             drawn out. Bounds of this program",
+};
+
+/// Energy that tears retina and pigment epithelium apart.
+pub const FRACTURE_ENERGY: ParameterRange = ParameterRange {
+    name: "fracture energy of the retina's bond",
+    unit: "mN/mm",
+    default: 0.14,
+    min: 0.06,
+    max: 0.6,
+    source: "in vivo, bleb and Laplace's law: rabbit 0.10, monkey 0.14, cat 0.18 N/m (Kita & Marmor 1992); twice that at 180 degrees, 1.5 times \
+             under mannitol; the bounds are this program's. A porcine peel test gave 11 N/m (Zhang 2023), more than the retina itself bears",
+};

@@ -9,14 +9,14 @@ use retina_core::surface::mesh_file::{MeshFormat, read_mesh};
 use retina_core::surface::{EYE_RADIUS, MeshError, PIT_DEPTH, PIT_SIGMA, TriangleMesh};
 use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA};
 use retina_core::tissue::rate::{PronyTerm, RateProperties};
-use retina_core::tissue::{Layer, Tissue};
+use retina_core::tissue::{Layer, RetinalBond, Tissue};
 
 use super::{DEFAULT_SCENE, rotation, unknown_name};
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::{Triangle, Vector};
 use crate::wire::request::SceneChoice;
 use crate::wire::scene::{
-    LayerSpec, PoseSpec, PronyTermSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec,
+    BondSpec, LayerSpec, PoseSpec, PronyTermSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec,
 };
 
 /// Name of every scene that is written out.
@@ -172,7 +172,16 @@ fn tissue(spec: &TissueSpec) -> Tissue {
         retina,
         choroid: or_default(&spec.choroid, &CHOROID),
         sclera: or_default(&spec.sclera, &SCLERA),
+        bond: bond(&spec.bond.unwrap_or_default()),
         rate: spec.rate.as_ref().map_or_else(RateProperties::default, rate),
+    }
+}
+
+fn bond(spec: &BondSpec) -> RetinalBond {
+    let default = RetinalBond::default();
+    RetinalBond {
+        strength_kpa: spec.strength_kpa.unwrap_or(default.strength_kpa),
+        fracture_energy_mn_per_mm: spec.fracture_energy_mn_per_mm.unwrap_or(default.fracture_energy_mn_per_mm),
     }
 }
 

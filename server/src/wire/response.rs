@@ -81,6 +81,9 @@ pub struct ContactAnswer {
     /// Share of the normal force that acts where the tissue slides along the needle, 0 to 1; told where `friction` is simulated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slipping_share: Option<f64>,
+    /// Largest share of the strength that the retina's bond has lost anywhere, 0 intact to 1 parted; told where `adhesion` is simulated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bond_damage: Option<f64>,
 }
 
 /// Whether needle and retina touch.
@@ -217,6 +220,7 @@ impl From<&ContactReport> for ContactAnswer {
             max_pressure_kpa: contact.max_pressure_kpa,
             max_penetration_um: contact.max_penetration_mm * 1e3,
             slipping_share: contact.slipping_share,
+            bond_damage: contact.bond_damage,
         }
     }
 }

@@ -53,7 +53,7 @@ fn main() -> Result<(), PredictError> {
                 needle: Needle::pointing(shape, Point3::from(TIP), &direction),
                 control: Control::Force(direction.into_inner() * force_mn),
                 level: Level::Reference,
-                effects: EffectChoice::All,
+                effects: EffectChoice::Named(["finite_strain", "contact"].map(str::to_owned).to_vec()),
             };
             let start = Instant::now();
             let reference = scene.predict(&request, &mut workspace, &mut Silent)?;
