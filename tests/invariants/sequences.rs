@@ -164,6 +164,18 @@ fn held_tissue_relaxes_from_stiff_to_the_elastic_answer() {
 }
 
 #[test]
+fn a_reaction_beyond_puncture_is_said() {
+    let scene = built_in("flat");
+    let said = |time_s: f64| {
+        let outcome = run(&scene, &sequence(with(&["viscoelasticity"]), vec![held(time_s, 0.0, 0.25)])).remove(0);
+        let pressure_kpa = reaction(&outcome) / (std::f64::consts::PI * 0.257 * 0.257);
+        (outcome.prediction.warnings.iter().any(|warning| warning.contains("(puncture)")), pressure_kpa > 15.0)
+    };
+    // The same depth: a stab meets glassy tissue, a slow needle yielding one.
+    assert_eq!((said(1e-4), said(1000.0)), ((true, true), (false, false)));
+}
+
+#[test]
 fn pressed_tissue_creeps_and_recovers() {
     let scene = built_in("macula");
     let loads = [(0.01, 0.4), (1.0, 0.4), (100.0, 0.4), (1000.0, 0.4), (1000.1, 0.0)];

@@ -3,6 +3,8 @@
 //! The start is the state before, moved by the difference of what linear elasticity expects of the two steps: exact for small steps, as good as
 //! a fresh start for large ones.
 
+use std::f64::consts::PI;
+
 use nalgebra::Vector3;
 
 use super::history::History;
@@ -11,8 +13,9 @@ use super::{Laid, Settled, Simulation, Step};
 use crate::equilibrium::{Load, MeshSize, Motion};
 use crate::predict::finite_element::{ContactEstimate, Problem};
 use crate::predict::linear::LinearAnswer;
-use crate::predict::{CutOrGrid, Level, PredictError, Prediction, Question};
+use crate::predict::{CutOrGrid, Level, PUNCTURE_PRESSURE_PER_MODULUS, PredictError, Prediction, Question};
 use crate::progress::Progress;
+use crate::tissue::Layer;
 
 /// How far a needle without a force is drawn back along its shaft (mm): nothing of the patch reaches it there.
 const WITHDRAWN_MM: f64 = 100.0;
@@ -146,6 +149,7 @@ impl Simulation<'_> {
         self.settled = Some(Settled { positions: equilibrium.positions, expected, pressed: linear.is_some() });
         let mut prediction = question.prediction(answer, self.decision.clone());
         prediction.warnings.extend(aim.warnings);
+        prediction.warnings.extend(puncture(question, &prediction));
         Ok((prediction, aim.laid))
     }
 
@@ -165,6 +169,18 @@ impl Simulation<'_> {
         }
         start
     }
+}
+
+/// That the reaction exceeds what a force may be: a needle that is moved fast meets stiffer tissue than the plan, which knows lasting loads.
+fn puncture(question: &Question, prediction: &Prediction) -> Option<String> {
+    let softest = |low: f64, layer: &Layer| low.min(layer.youngs_modulus_kpa);
+    let modulus_kpa = question.prepared.scene().tissue.retina.iter().fold(f64::INFINITY, softest);
+    let limit_kpa = PUNCTURE_PRESSURE_PER_MODULUS * modulus_kpa;
+    let pressure_kpa = prediction.needle.reaction_mn.norm() / (PI * question.tool.body.radius_mm().powi(2));
+    let beyond = question.motion.force_mn.is_none() && pressure_kpa > limit_kpa;
+    beyond.then(|| {
+        format!("the reaction presses the tissue with {pressure_kpa:.1} kPa, beyond the limit of {limit_kpa:.1} kPa for this tissue (puncture)")
+    })
 }
 
 /// Stands for a contact where there is none: the mesh is then laid around the patch's centre.
