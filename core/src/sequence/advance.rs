@@ -1,7 +1,7 @@
 //! One step of a simulation: where its mesh stands, what it starts from, its equilibrium, and what is remembered of it.
 //!
 //! The start is the state before, moved by the difference of what linear elasticity expects of the two steps: exact for small steps, as good as
-//! a fresh start for large ones.
+//! a fresh start for large ones. A needle that is held where it was starts from the state before as it is.
 
 use std::f64::consts::PI;
 
@@ -19,6 +19,8 @@ use crate::tissue::Layer;
 
 /// How far a needle without a force is drawn back along its shaft (mm): nothing of the patch reaches it there.
 const WITHDRAWN_MM: f64 = 100.0;
+/// Distance below which a needle that is held has not moved (mm): rounding between the frames of scene and patch.
+const UNMOVED_MM: f64 = 1e-9;
 
 /// The mesh of a step.
 struct Aim {
@@ -156,6 +158,11 @@ impl Simulation<'_> {
     /// Positions to start from.
     fn start(&self, expected: &[f64], motion: &Motion) -> Vec<f64> {
         let Some(settled) = &self.settled else { return expected.to_vec() };
+        let tip = 3 * self.topology.needle();
+        let apart_mm = (0..3).map(|k| (settled.positions[tip + k] - expected[tip + k]).abs()).fold(0.0, f64::max);
+        if motion.force_mn.is_none() && apart_mm < UNMOVED_MM {
+            return settled.positions.clone();
+        }
         let mut start: Vec<f64> = settled
             .positions
             .iter()
@@ -164,7 +171,6 @@ impl Simulation<'_> {
             .collect();
         // A needle that is held stands exactly where it is told; one that was elsewhere has nothing to go on from.
         if motion.force_mn.is_none() || !settled.pressed {
-            let tip = 3 * self.topology.needle();
             start[tip..].copy_from_slice(&expected[tip..]);
         }
         start
