@@ -164,6 +164,18 @@ fn held_tissue_relaxes_from_stiff_to_the_elastic_answer() {
 }
 
 #[test]
+fn a_reaction_beyond_puncture_is_said() {
+    let scene = built_in("flat");
+    let said = |time_s: f64| {
+        let outcome = run(&scene, &sequence(with(&["viscoelasticity"]), vec![held(time_s, 0.0, 0.25)])).remove(0);
+        let pressure_kpa = reaction(&outcome) / (std::f64::consts::PI * 0.257 * 0.257);
+        (outcome.prediction.warnings.iter().any(|warning| warning.contains("(puncture)")), pressure_kpa > 15.0)
+    };
+    // The same depth: a stab meets glassy tissue, a slow needle yielding one.
+    assert_eq!((said(1e-4), said(1000.0)), ((true, true), (false, false)));
+}
+
+#[test]
 fn pressed_tissue_creeps_and_recovers() {
     let scene = built_in("macula");
     let loads = [(0.01, 0.4), (1.0, 0.4), (100.0, 0.4), (1000.0, 0.4), (1000.1, 0.0)];
@@ -232,4 +244,32 @@ fn what_cannot_be_is_refused_before_it_begins() {
     assert!(matches!(refusal(&too_deep), SequenceError::At { step: 1, .. }));
     let linear = Sequence { level: Level::Linear, ..sequence(EffectChoice::Auto, vec![pushed(1.0, 0.1)]) };
     assert!(matches!(refusal(&linear), SequenceError::Level { level: "linear" }));
+}
+
+#[test]
+fn random_sequences_of_any_step_are_all_answered() {
+    let scene = built_in("macula");
+    let mut random = fastrand::Rng::with_seed(41);
+    let mut iterations = Vec::new();
+    for request in requests(&scene, 57, 20) {
+        let (mut time_s, mut steps) = (0.0, Vec::new());
+        for _ in 0..5 {
+            time_s += 10.0_f64.powf(9.0 * random.f64() - 6.0);
+            let force_mn = match random.usize(0..6) {
+                0 => Some(Vector3::zeros()),
+                1 => None,
+                _ => Some(force(&request) * random.f64()),
+            };
+            steps.push(Step { time_s, force_mn, ..Step::default() });
+        }
+        let sequence = Sequence { needle: request.needle, steps, level: Level::Coarse, effects: EffectChoice::All };
+        for outcome in run(&scene, &sequence) {
+            let numbers = outcome.prediction.vertices.iter().flat_map(|vertex| vertex.coords.iter().copied());
+            assert!(numbers.chain(outcome.prediction.needle.reaction_mn.iter().copied()).all(f64::is_finite));
+            iterations.push(outcome.prediction.solver.iterations);
+        }
+    }
+    iterations.sort_unstable();
+    // As few as a single prediction needs: the start from the step before serves steps of any size.
+    assert!(iterations[iterations.len() / 2] <= 8, "{iterations:?}");
 }

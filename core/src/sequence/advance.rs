@@ -1,7 +1,9 @@
 //! One step of a simulation: where its mesh stands, what it starts from, its equilibrium, and what is remembered of it.
 //!
 //! The start is the state before, moved by the difference of what linear elasticity expects of the two steps: exact for small steps, as good as
-//! a fresh start for large ones.
+//! a fresh start for large ones. A needle that is held where it was starts from the state before as it is.
+
+use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
@@ -12,11 +14,14 @@ use crate::equilibrium::{Load, MeshSize, Motion};
 use crate::predict::expected_error::ExpectedError;
 use crate::predict::finite_element::{ContactEstimate, Problem};
 use crate::predict::linear::LinearAnswer;
-use crate::predict::{CutOrGrid, Level, PredictError, Prediction, Question};
+use crate::predict::{CutOrGrid, Level, PUNCTURE_PRESSURE_PER_MODULUS, PredictError, Prediction, Question};
 use crate::progress::Progress;
+use crate::tissue::Layer;
 
 /// How far a needle without a force is drawn back along its shaft (mm): nothing of the patch reaches it there.
 const WITHDRAWN_MM: f64 = 100.0;
+/// Distance below which a needle that is held has not moved (mm): rounding between the frames of scene and patch.
+const UNMOVED_MM: f64 = 1e-9;
 
 /// The mesh of a step.
 struct Aim {
@@ -153,12 +158,18 @@ impl Simulation<'_> {
         expected_error.calibrated &= self.history.is_none();
         let mut prediction = question.prediction(answer, self.decision.clone(), expected_error);
         prediction.warnings.extend(aim.warnings);
+        prediction.warnings.extend(puncture(question, &prediction));
         Ok((prediction, aim.laid))
     }
 
     /// Positions to start from.
     fn start(&self, expected: &[f64], motion: &Motion) -> Vec<f64> {
         let Some(settled) = &self.settled else { return expected.to_vec() };
+        let tip = 3 * self.topology.needle();
+        let apart_mm = (0..3).map(|k| (settled.positions[tip + k] - expected[tip + k]).abs()).fold(0.0, f64::max);
+        if motion.force_mn.is_none() && apart_mm < UNMOVED_MM {
+            return settled.positions.clone();
+        }
         let mut start: Vec<f64> = settled
             .positions
             .iter()
@@ -167,11 +178,22 @@ impl Simulation<'_> {
             .collect();
         // A needle that is held stands exactly where it is told; one that was elsewhere has nothing to go on from.
         if motion.force_mn.is_none() || !settled.pressed {
-            let tip = 3 * self.topology.needle();
             start[tip..].copy_from_slice(&expected[tip..]);
         }
         start
     }
+}
+
+/// That the reaction exceeds what a force may be: a needle that is moved fast meets stiffer tissue than the plan, which knows lasting loads.
+fn puncture(question: &Question, prediction: &Prediction) -> Option<String> {
+    let softest = |low: f64, layer: &Layer| low.min(layer.youngs_modulus_kpa);
+    let modulus_kpa = question.prepared.scene().tissue.retina.iter().fold(f64::INFINITY, softest);
+    let limit_kpa = PUNCTURE_PRESSURE_PER_MODULUS * modulus_kpa;
+    let pressure_kpa = prediction.needle.reaction_mn.norm() / (PI * question.tool.body.radius_mm().powi(2));
+    let beyond = question.motion.force_mn.is_none() && pressure_kpa > limit_kpa;
+    beyond.then(|| {
+        format!("the reaction presses the tissue with {pressure_kpa:.1} kPa, beyond the limit of {limit_kpa:.1} kPa for this tissue (puncture)")
+    })
 }
 
 /// Stands for a contact where there is none: the mesh is then laid around the patch's centre.
