@@ -3,7 +3,8 @@
 //! Contract: a [`Tissue`] lists its layers from the vitreous outwards; [`Tissue::validate`] holds every number against the ranges of
 //! [`ranges`]. Units: mm, kPa; Poisson's ratio is a pure number.
 //!
-//! Not here: where the layers lie in space (`surface`), the energy of the material (`effect`). Published moduli of the retina span 0.9 to 30 kPa by method, so every number is a scene parameter and none a constant.
+//! Not here: where the layers lie in space (`surface`), the energy of the material (`effect`). Published moduli of the retina
+//! span 0.9 to 30 kPa by method, so every number is a scene parameter and none a constant.
 
 pub mod ranges;
 pub mod rate;

@@ -369,3 +369,31 @@ fn the_wall_is_as_thick_as_its_layers_and_thins_under_the_pit() {
         assert_eq!(layers, 2.0 - 0.5 * level as f64);
     }
 }
+
+#[test]
+fn an_interface_doubles_its_vertices_and_changes_nothing_else() {
+    let whole = WallTopology::new(division()).unwrap();
+    let split = WallTopology::new(WallDivision { layers_above_interface: Some(1), ..division() }).unwrap();
+    assert!(whole.interface.is_empty() && split.interface.len() == whole.faces.len());
+    let disc = DiscGeometry { center: [0.1, -0.2], radii: vec![0.2, 0.5, 0.9, 1.5] };
+    let layer = |thickness_mm, thins| LayerThickness { thickness_mm, thins, first_element_mm: f64::INFINITY };
+    let layers = [layer(0.25, true), layer(0.3, false)];
+    let column = |x: f64, y: f64| Surface::Sphere { radius_mm: 12.0 }.column(x, y);
+    let [whole_at, split_at] =
+        [&whole, &split].map(|topology| WallGeometry::new(topology, &disc, &layers, column).unwrap());
+    // The same elements at the same places, and the interface's two sides on each other.
+    let places = |stencils: &Stencils, rest: &[f64]| -> Vec<f64> {
+        stencils.vertices.iter().flat_map(|&v| rest[3 * v as usize..][..3].to_vec()).collect()
+    };
+    assert_eq!(places(&whole.elements, &whole_at.rest), places(&split.elements, &split_at.rest));
+    let mut pairs = std::collections::HashSet::new();
+    for group in 0..split.interface.len() {
+        let (below, above) = split.interface.group(group).split_at(8);
+        for (&low, &high) in below.iter().zip(above) {
+            assert_ne!(low, high);
+            pairs.insert((low, high));
+            assert_eq!(split_at.rest[3 * low as usize..][..3], split_at.rest[3 * high as usize..][..3]);
+        }
+    }
+    assert_eq!(split.vertices.len(), whole.vertices.len() + pairs.len());
+}

@@ -249,8 +249,15 @@ impl Problem<'_> {
         resolution: &Resolution,
         mesh: &MeshSize,
     ) -> Result<Wall<'b>, WallError> {
-        let mut wall =
-            Wall::new(topology, &self.patch.surface, self.tissue, mesh, self.solid, self.contact(resolution), self.tool)?;
+        let mut wall = Wall::new(
+            topology,
+            &self.patch.surface,
+            self.tissue,
+            mesh,
+            self.solid,
+            self.contact(resolution),
+            self.tool,
+        )?;
         if let (Some(settled), Some(pressure_kpa)) = (self.settled(resolution), self.pressure_kpa) {
             wall.settle(&self.patch.surface, &settled, pressure_kpa);
         }

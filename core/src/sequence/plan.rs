@@ -156,11 +156,8 @@ pub(super) fn plan<'a>(
     let patch = prepared.patch_for(&sequence.request(first, &sequence.needle), body).map_err(|cause| at(0, cause))?;
     let sliding = Sliding { coefficient: prepared.scene().friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
     let tissue = &prepared.scene().tissue;
-    let pull = Pull {
-        normal_force_mn: 0.0,
-        depth_mm: tissue.retina_thickness_mm(),
-        strength_kpa: tissue.bond.strength_kpa,
-    };
+    let pull =
+        Pull { normal_force_mn: 0.0, depth_mm: tissue.retina_thickness_mm(), strength_kpa: tissue.bond.strength_kpa };
     let mut plan = Plan {
         contacts: Vec::with_capacity(sequence.steps.len()),
         deepest: Expected { depth_mm: 0.0, strain: 0.0, sliding, pull },
