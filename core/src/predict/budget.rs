@@ -46,7 +46,7 @@ impl Budget {
             || Level::ALL.into_iter().zip(*times_ms).map(|(level, ms)| (level, ms, situation.expected_error(level)));
         let in_time = |ms: f64| self.max_time_ms.is_none_or(|most| ms <= most);
         let exact = |error: &ExpectedError| self.max_error_um.is_none_or(|most| error.p95_um <= most);
-        let latest_in_time = || entries().filter(|(_, ms, _)| in_time(*ms)).last();
+        let latest_in_time = || entries().rfind(|(_, ms, _)| in_time(*ms));
         let cheapest = || entries().next();
         let (level, ms, error) = match (self.level, self.max_error_um, self.max_time_ms) {
             (Some(level), ..) => entries().find(|(entry, ..)| *entry == level),
