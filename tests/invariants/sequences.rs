@@ -106,6 +106,22 @@ fn a_static_step_does_not_depend_on_the_steps_before_it() {
 }
 
 #[test]
+fn a_needle_that_is_let_be_changes_nothing() {
+    let scene = built_in("fovea");
+    for request in requests(&scene, 7, 6) {
+        let press = Step { time_s: 1.0, force_mn: Some(force(&request)), ..Step::default() };
+        let hold = Step { time_s: 2.0, ..Step::default() };
+        let less = Step { time_s: 3.0, force_mn: Some(force(&request) * 0.5), ..Step::default() };
+        let steps = vec![press, hold, less];
+        let sequence = Sequence { needle: request.needle, steps, level: Level::Coarse, effects: with(&[]) };
+        let outcomes = run(&scene, &sequence);
+        let apart = |k: usize| apart_um(&outcomes[k].prediction.vertices, &outcomes[k - 1].prediction.vertices);
+        assert!(!outcomes[1].mesh_laid && apart(1) < 1e-3, "{} µm", apart(1));
+        assert!(apart(2) > 0.1, "{} µm", apart(2));
+    }
+}
+
+#[test]
 fn a_contact_that_wanders_gets_a_new_mesh_or_a_warning() {
     let scene = built_in("flat");
     let path: Vec<Step> = (0..6).map(|k| held(1.0 + f64::from(k), -0.5 + 0.2 * f64::from(k), 0.06)).collect();

@@ -20,8 +20,6 @@ use crate::tissue::Layer;
 
 /// How far a needle without a force is drawn back along its shaft (mm): nothing of the patch reaches it there.
 const WITHDRAWN_MM: f64 = 100.0;
-/// Distance below which a needle that is held has not moved (mm): rounding between the frames of scene and patch.
-const UNMOVED_MM: f64 = 1e-9;
 
 /// The mesh of a step.
 struct Aim {
@@ -63,6 +61,13 @@ impl Simulation<'_> {
         Ok((prediction, laid))
     }
 
+    /// Whether the needle is held where the step before left it.
+    fn unmoved(&self, question: &Question) -> bool {
+        let needle = &question.request.needle;
+        let stays = (needle.tip_mm, needle.orientation) == (self.needle.tip_mm, self.needle.orientation);
+        stays && question.motion.force_mn.is_none() && self.settled.as_ref().is_some_and(|settled| settled.pressed)
+    }
+
     /// The mesh of a step: that which is laid, or a new one where that does not fit and nothing is remembered.
     fn aim(
         &mut self,
@@ -74,7 +79,7 @@ impl Simulation<'_> {
         let contact = linear.map(|linear| question.estimate(linear));
         let remembers = self.rates.any();
         let fitting = |mesh: &ContactEstimate| contact.as_ref().is_none_or(|contact| fits(mesh, contact));
-        let kept = self.laid.clone().filter(|laid| remembers || fitting(&laid.contact));
+        let kept = self.laid.clone().filter(|laid| remembers || self.unmoved(question) || fitting(&laid.contact));
         let laid = match &kept {
             Some(laid) => laid.clone(),
             None => {
@@ -128,7 +133,7 @@ impl Simulation<'_> {
             None => wall.start(),
         };
         wall.place_tip(&mut expected, &(motion.direction.into_inner() * motion.travel_mm));
-        let start = self.start(&expected, &motion);
+        let start = self.start(&expected, &motion, self.unmoved(question));
         progress.stage("equilibrium");
         let level = question.request.level.name();
         let solver = &mut self.solver;
@@ -163,11 +168,9 @@ impl Simulation<'_> {
     }
 
     /// Positions to start from.
-    fn start(&self, expected: &[f64], motion: &Motion) -> Vec<f64> {
+    fn start(&self, expected: &[f64], motion: &Motion, unmoved: bool) -> Vec<f64> {
         let Some(settled) = &self.settled else { return expected.to_vec() };
-        let tip = 3 * self.topology.needle();
-        let apart_mm = (0..3).map(|k| (settled.positions[tip + k] - expected[tip + k]).abs()).fold(0.0, f64::max);
-        if motion.force_mn.is_none() && apart_mm < UNMOVED_MM {
+        if unmoved {
             return settled.positions.clone();
         }
         let mut start: Vec<f64> = settled
@@ -178,6 +181,7 @@ impl Simulation<'_> {
             .collect();
         // A needle that is held stands exactly where it is told; one that was elsewhere has nothing to go on from.
         if motion.force_mn.is_none() || !settled.pressed {
+            let tip = 3 * self.topology.needle();
             start[tip..].copy_from_slice(&expected[tip..]);
         }
         start
