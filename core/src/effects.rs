@@ -5,9 +5,19 @@ pub mod contact;
 pub mod elasticity;
 pub mod finite_strain;
 pub mod friction;
+pub mod inertia;
 pub mod pressure;
 pub mod solid;
+pub mod viscoelasticity;
 
 /// Names of every effect, in the order in which reports list them.
-pub const EFFECT_NAMES: [&str; 6] =
-    [elasticity::NAME, finite_strain::NAME, contact::NAME, friction::NAME, pressure::NAME, adhesion::NAME];
+pub const EFFECT_NAMES: [&str; 8] = [
+    elasticity::NAME,
+    finite_strain::NAME,
+    contact::NAME,
+    friction::NAME,
+    pressure::NAME,
+    adhesion::NAME,
+    viscoelasticity::NAME,
+    inertia::NAME,
+];

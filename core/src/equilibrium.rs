@@ -177,6 +177,8 @@ const ATTEMPTS: [Attempt; 4] = [
     Attempt { load_steps: 8, globalization: Globalization::PredictedStress, max_iterations: 30 },
     Attempt { load_steps: 12, globalization: Globalization::LineSearch, max_iterations: 100 },
 ];
+/// Iterations of all attempts together: what takes more is a sharp edge that cuts its way in, where no load path of this model ends.
+const MOST_ITERATIONS: usize = 120;
 /// Iterations in which the needle waits for the tissue.
 const HELD_ITERATIONS: usize = 1;
 /// Share of the remaining way by which the needle overlaps the tissue at the start of load steps.
@@ -225,6 +227,11 @@ impl<'a> Wall<'a> {
     /// The mesh's topology.
     pub fn topology(&self) -> &WallTopology {
         self.topology
+    }
+
+    /// The inner surface's faces at rest.
+    pub fn faces(&self) -> &ContactFaces {
+        &self.faces
     }
 
     /// Lets the wall begin, and its rim stand, where every point has sunk along its column under `pressure_kpa`.
@@ -341,21 +348,24 @@ impl<'a> Wall<'a> {
         progress: &mut dyn Progress,
     ) -> Result<Equilibrium, NewtonError> {
         let mut start = Some(positions);
-        let mut failed_iterations = 0;
+        let mut spent = 0;
         let mut failure = NewtonError::Interrupted { iterations: 0 };
         for attempt in &ATTEMPTS {
+            if spent >= MOST_ITERATIONS {
+                break;
+            }
             let positions = start.take().unwrap_or_else(|| self.touching(load));
-            match self.follow(load, attempt, positions, workspace, progress) {
+            match self.follow(load, attempt, positions, &mut spent, workspace, progress) {
                 Ok(mut equilibrium) => {
-                    equilibrium.newton.iterations += failed_iterations;
+                    equilibrium.newton.iterations = spent;
                     return Ok(equilibrium);
                 }
                 Err(stop @ NewtonError::Interrupted { .. }) => return Err(stop),
-                Err(error) => {
-                    failed_iterations += error.iterations();
-                    failure = error;
-                }
+                Err(error) => failure = error,
             }
+        }
+        if let NewtonError::NotConverged { iterations, .. } = &mut failure {
+            *iterations = spent;
         }
         Err(failure)
     }
@@ -375,6 +385,7 @@ impl<'a> Wall<'a> {
         load: &Load,
         attempt: &Attempt,
         mut positions: Vec<f64>,
+        spent: &mut usize,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<Equilibrium, NewtonError> {
@@ -394,11 +405,12 @@ impl<'a> Wall<'a> {
             };
             if self.contact.softening > 1.0 {
                 let drive = (drive, SOFTENED_TOLERANCE);
-                total += self.newton(&softened, drive, load, attempt, &mut positions, workspace, progress)?;
+                total += self.newton(&softened, drive, load, attempt, &mut positions, spent, workspace, progress)?;
             }
             if self.contact.softening <= 1.0 || step == attempt.load_steps {
                 let drive = (drive, RELATIVE_TOLERANCE);
-                total += self.newton(&self.contact, drive, load, attempt, &mut positions, workspace, progress)?;
+                total +=
+                    self.newton(&self.contact, drive, load, attempt, &mut positions, spent, workspace, progress)?;
             }
         }
         Ok(self.equilibrium(motion, positions, total, attempt.load_steps, workspace))
@@ -413,6 +425,7 @@ impl<'a> Wall<'a> {
         load: &Load,
         attempt: &Attempt,
         positions: &mut [f64],
+        spent: &mut usize,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<NewtonReport, NewtonError> {
@@ -435,11 +448,13 @@ impl<'a> Wall<'a> {
             globalization: attempt.globalization,
             force_scale_mn: scale,
             tolerance_mn: tolerance * scale,
-            max_iterations: attempt.max_iterations,
+            max_iterations: attempt.max_iterations.min(MOST_ITERATIONS.saturating_sub(*spent)),
             held_iterations: HELD_ITERATIONS,
             max_travel_mm: MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
         };
-        system.solve(positions, drive, &settings, workspace, progress)
+        let solved = system.solve(positions, drive, &settings, workspace, progress);
+        *spent += solved.as_ref().map_or_else(NewtonError::iterations, |report| report.iterations);
+        solved
     }
 
     fn equilibrium(

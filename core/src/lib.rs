@@ -5,6 +5,7 @@
 
 pub mod approach;
 pub mod assemble;
+pub mod comparison;
 pub mod effect;
 pub mod effects;
 pub mod equilibrium;
@@ -16,6 +17,8 @@ pub mod predict;
 pub mod progress;
 pub mod range;
 pub mod scene;
+pub mod sequence;
 pub mod solve;
 pub mod surface;
 pub mod tissue;
+pub mod working_range;

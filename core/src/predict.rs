@@ -5,10 +5,13 @@
 //! threads.
 
 pub mod beds;
+pub mod budget;
+pub mod calibration;
 pub mod choice;
+pub mod expected_error;
 pub mod finite_element;
 pub mod linear;
-mod topologies;
+pub(crate) mod topologies;
 pub mod types;
 
 pub use types::*;
@@ -28,9 +31,11 @@ use crate::progress::Progress;
 use crate::scene::{Scene, SceneSurface};
 use crate::solve::newton;
 use beds::Beds;
+use budget::{Budget, Choice, LevelTimes};
 use choice::adhesion::Pull;
 use choice::friction::Sliding;
 use choice::{Decision, Expected, decide, pressure};
+use expected_error::{ExpectedError, Situation};
 use finite_element::{Bench, COARSE, ContactEstimate, FiniteElementAnswer, Problem, REFERENCE, Resolution};
 use linear::{LinearAnswer, Load, Press, press};
 use topologies::shared_topology;
@@ -113,40 +118,88 @@ impl PreparedScene {
         progress: &mut dyn Progress,
     ) -> Result<Prediction, PredictError> {
         progress.stage("linear");
-        request.needle.validate()?;
         let body = request.needle.shape.body();
-        let first = self.question(request, &body, &request.needle.tip_mm)?;
-        let question = match self.scene.surface {
-            // The patch is the nodes nearest to the contact: cut again where the needle touches.
-            SceneSurface::Mesh(_) => match press(first.patch(), &first.tool, &first.motion) {
-                Ok(press) => {
-                    let [x, y] = press.touch.parameter;
-                    let touch = first.patch().surface.column(x, y).surface;
-                    let touch_in_scene = first.patch().scene_from_patch * touch;
-                    self.question(request, &body, &touch_in_scene)?
-                }
-                Err(_) => first,
-            },
-            _ => first,
-        };
-        question.answer(resolution, workspace, progress)
+        self.aimed(request, &body)?.answer(resolution, workspace, progress)
     }
 
-    /// The request in the frame of the patch around `contact`.
-    fn question<'a>(
-        &'a self,
-        request: &'a Request,
-        body: &'a Body,
-        contact: &Point3<f64>,
-    ) -> Result<Question<'a>, PredictError> {
-        let patch = match &self.patch {
+    /// The level that answers `request` (whose own level does not matter) within `budget`, where the levels take `times_ms`.
+    ///
+    /// # Errors
+    /// [`PredictError::Budget`] for a strict budget that no level keeps; what [`PreparedScene::predict`] would refuse.
+    pub fn choose(&self, request: &Request, budget: &Budget, times_ms: &LevelTimes) -> Result<Choice, PredictError> {
+        budget.choose(&self.situation(request)?, times_ms)
+    }
+
+    /// What is known of `request` before a level computes it.
+    ///
+    /// # Errors
+    /// What [`PreparedScene::predict`] would refuse.
+    pub fn situation(&self, request: &Request) -> Result<Situation, PredictError> {
+        let body = request.needle.shape.body();
+        let question = self.aimed(request, &body)?;
+        Ok(match question.begin(&question.raised(&question.sink()))? {
+            Begun::Still(_) => question.situation(0.0, 0.0, None),
+            Begun::Pressed(linear) => question.situation_under(&linear),
+        })
+    }
+
+    /// The request in the frame of the patch where the needle touches.
+    fn aimed<'a>(&'a self, request: &'a Request, body: &'a Body) -> Result<Question<'a>, PredictError> {
+        request.needle.validate()?;
+        Ok(Question::new(self, request, body, self.patch_for(request, body)?))
+    }
+
+    /// The patch of a request: the scene's own, or the nodes of its mesh nearest to where the needle touches.
+    pub(crate) fn patch_for(&self, request: &Request, body: &Body) -> Result<CutOrGrid<'_>, PredictError> {
+        if let Some(patch) = &self.patch {
+            return Ok(CutOrGrid::Grid(patch));
+        }
+        let tip = request.needle.tip_mm;
+        let first = Question::new(self, request, body, self.patch_around(&tip)?);
+        let around = press(first.patch(), &first.tool, &first.motion).map(|press| {
+            let [x, y] = press.touch.parameter;
+            first.patch().scene_from_patch * first.patch().surface.column(x, y).surface
+        });
+        self.patch_around(&around.unwrap_or(tip))
+    }
+
+    /// The patch of a contact (scene coordinates).
+    fn patch_around(&self, contact: &Point3<f64>) -> Result<CutOrGrid<'_>, PredictError> {
+        Ok(match &self.patch {
             Some(patch) => CutOrGrid::Grid(patch),
             None => CutOrGrid::Cut(Box::new(self.scene.patch(contact)?)),
-        };
-        let frame = match &patch {
-            CutOrGrid::Grid(patch) => patch.scene_from_patch,
-            CutOrGrid::Cut(patch) => patch.scene_from_patch,
-        };
+        })
+    }
+}
+
+/// A grid's patch is the scene's, a cut one the request's own.
+pub(crate) enum CutOrGrid<'a> {
+    Grid(&'a Patch),
+    Cut(Box<Patch>),
+}
+
+impl CutOrGrid<'_> {
+    pub(crate) fn patch(&self) -> &Patch {
+        match self {
+            CutOrGrid::Grid(patch) => patch,
+            CutOrGrid::Cut(patch) => patch,
+        }
+    }
+}
+
+/// A request in the patch frame.
+pub(crate) struct Question<'a> {
+    pub(crate) prepared: &'a PreparedScene,
+    pub(crate) request: &'a Request,
+    patch: CutOrGrid<'a>,
+    pub(crate) tool: Tool<'a>,
+    pub(crate) motion: Motion,
+}
+
+impl<'a> Question<'a> {
+    /// The request in the frame of `patch`.
+    pub(crate) fn new(prepared: &'a PreparedScene, request: &'a Request, body: &'a Body, patch: CutOrGrid<'a>) -> Self {
+        let frame = patch.patch().scene_from_patch;
         let patch_from_needle = frame.inverse() * request.needle.scene_from_needle();
         let motion = match request.control {
             Control::Force(force) => Motion {
@@ -158,41 +211,44 @@ impl PreparedScene {
                 Motion { direction: patch_from_needle.rotation * -Vector3::z_axis(), force_mn: None, travel_mm: 0.0 }
             }
         };
-        Ok(Question { prepared: self, request, patch, tool: Tool { body, patch_from_needle }, motion })
+        Question { prepared, request, patch, tool: Tool { body, patch_from_needle }, motion }
     }
 }
 
-/// A grid's patch is the scene's, a cut one the request's own.
-enum CutOrGrid<'a> {
-    Grid(&'a Patch),
-    Cut(Box<Patch>),
+/// What a request comes to before any level computes it.
+enum Begun<'a> {
+    /// Nothing moves, for this reason.
+    Still(&'static str),
+    /// The needle presses.
+    Pressed(LinearAnswer<'a>),
 }
 
 /// What the eye's pressure does by itself.
-struct Sink {
+pub(crate) struct Sink {
     /// The decision about the effect.
-    report: EffectReport,
+    pub(crate) report: EffectReport,
     /// Change of the pressure (kPa), where it is simulated.
     change_kpa: Option<f64>,
     /// Sinking that linear elasticity expects of it at the patch's centre, in magnitude (mm); 0 where it is not simulated.
     expected_mm: f64,
 }
 
-/// A request in the patch frame.
-struct Question<'a> {
-    prepared: &'a PreparedScene,
-    request: &'a Request,
-    patch: CutOrGrid<'a>,
-    tool: Tool<'a>,
-    motion: Motion,
-}
-
 impl Question<'_> {
-    fn patch(&self) -> &Patch {
-        match &self.patch {
-            CutOrGrid::Grid(patch) => patch,
-            CutOrGrid::Cut(patch) => patch,
+    pub(crate) fn patch(&self) -> &Patch {
+        self.patch.patch()
+    }
+
+    /// The linear answer inside the limits of the tissue model; `None` where the needle does not reach the surface.
+    pub(crate) fn pressed(&self, tool: &Tool) -> Result<Option<LinearAnswer<'_>>, PredictError> {
+        let press = press(self.patch(), tool, &self.motion)?;
+        self.check_pressure(&press)?;
+        if matches!(press.load, Load::Depth(depth) if depth <= 0.0) {
+            return Ok(None);
         }
+        let tip = self.request.needle.shape.tip;
+        let linear = LinearAnswer::new(&self.prepared.beds, self.patch(), tool, tip, press, &self.motion.direction)?;
+        self.check_depth(&linear)?;
+        Ok(Some(linear))
     }
 
     fn answer(
@@ -208,34 +264,17 @@ impl Question<'_> {
             depth_mm: self.prepared.scene.tissue.retina_thickness_mm(),
             strength_kpa: self.prepared.scene.tissue.bond.strength_kpa,
         };
-        let still =
-            Expected { depth_mm: sink.expected_mm, strain: sink.expected_mm / self.yielding_mm(), sliding, pull };
-        if self.motion.force_mn == Some(0.0) {
-            let decision = self.decide(still, &sink)?;
-            return Ok(self.at_rest(decision, &sink, "no force is applied"));
-        }
-        let tool = self.raised(&sink);
-        let press = press(self.patch(), &tool, &self.motion)?;
-        self.check_pressure(&press)?;
-        let closed = !matches!(press.load, Load::Depth(depth) if depth <= 0.0);
-        if !closed {
-            let decision = self.decide(still, &sink)?;
-            return Ok(self.at_rest(decision, &sink, "the needle does not reach the surface"));
-        }
-        let linear = LinearAnswer::new(
-            &self.prepared.beds,
-            self.patch(),
-            &tool,
-            self.request.needle.shape.tip,
-            press,
-            &self.motion.direction,
-        )?;
-        self.check_depth(&linear)?;
+        let linear = match self.begin(&self.raised(&sink))? {
+            Begun::Pressed(linear) => linear,
+            Begun::Still(why) => {
+                let strain = sink.expected_mm / self.yielding_mm();
+                let decision = self.decide(Expected { depth_mm: sink.expected_mm, strain, sliding, pull }, &sink)?;
+                return Ok(self.at_rest(decision, sink.change_kpa, why));
+            }
+        };
         let strain = linear.depth_mm / self.yielding_mm();
         let moved_mm = linear.depth_mm + sink.expected_mm;
-        let cosine = linear.press.cosine;
-        let sliding =
-            Sliding { depth_mm: linear.depth_mm, tangent: (1.0 - cosine * cosine).max(0.0).sqrt() / cosine, ..sliding };
+        let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
         let [x, y] = linear.press.touch.parameter;
         let pull = Pull {
             normal_force_mn: linear.normal_force_mn,
@@ -245,18 +284,40 @@ impl Question<'_> {
         let expected = Expected { depth_mm: moved_mm, strain: moved_mm / self.yielding_mm(), sliding, pull };
         let decision = self.decide(expected, &sink)?;
         if !decision.contact {
-            return Ok(self.at_rest(decision, &sink, "contact is not simulated"));
+            return Ok(self.at_rest(decision, sink.change_kpa, "contact is not simulated"));
         }
         let answer = match self.request.level {
             Level::Linear => self.linear(&linear, strain, &sink),
-            Level::Coarse => self.coarse(&linear, &decision, &sink, workspace, progress)?,
-            Level::Reference => self.fine(resolution, &linear, &decision, &sink, workspace, progress)?,
+            Level::Coarse => self.coarse(&linear, &decision, sink.change_kpa, workspace, progress)?,
+            Level::Reference => self.fine(resolution, &linear, &decision, sink.change_kpa, workspace, progress)?,
         };
-        Ok(self.prediction(self.with_node_penetration(answer), decision))
+        let expected = self.situation_under(&linear).expected_error(self.request.level);
+        Ok(self.prediction(self.with_node_penetration(answer), decision, expected))
+    }
+
+    /// The linear answer, or why nothing moves.
+    fn begin(&self, tool: &Tool) -> Result<Begun<'_>, PredictError> {
+        if self.motion.force_mn == Some(0.0) {
+            return Ok(Begun::Still("no force is applied"));
+        }
+        Ok(match self.pressed(tool)? {
+            Some(linear) => Begun::Pressed(linear),
+            None => Begun::Still("the needle does not reach the surface"),
+        })
+    }
+
+    pub(crate) fn situation_under(&self, linear: &LinearAnswer) -> Situation {
+        self.situation(linear.depth_mm, linear.depth_mm / self.yielding_mm(), Some(&linear.press))
+    }
+
+    fn situation(&self, depth_mm: f64, strain: f64, press: Option<&Press>) -> Situation {
+        let points = self.tool.patch_from_needle.rotation * -Vector3::z_axis();
+        let angle_deg = press.map_or(0.0, |press| points.dot(&press.touch.inward).clamp(-1.0, 1.0).acos().to_degrees());
+        Situation::new(&self.prepared.scene, &self.request.needle.shape, angle_deg, depth_mm, strain)
     }
 
     /// What the eye's pressure does by itself.
-    fn sink(&self) -> Sink {
+    pub(crate) fn sink(&self) -> Sink {
         let Scene { tissue, .. } = &self.prepared.scene;
         let change_kpa = self.prepared.scene.pressure_change_kpa();
         let linear = Settled::new(tissue, change_kpa, Solid::Elasticity, |_| true);
@@ -272,8 +333,8 @@ impl Question<'_> {
     }
 
     /// The surface far from the needle under the pressure, by the law of `solid`.
-    fn settled(&self, sink: &Sink, solid: Solid) -> Option<Settled> {
-        sink.change_kpa.map(|change_kpa| Settled::new(&self.prepared.scene.tissue, change_kpa, solid, |_| true))
+    fn settled(&self, change_kpa: Option<f64>, solid: Solid) -> Option<Settled> {
+        change_kpa.map(|change_kpa| Settled::new(&self.prepared.scene.tissue, change_kpa, solid, |_| true))
     }
 
     /// How far the surface at `parameter` sinks under the pressure (mm).
@@ -296,13 +357,14 @@ impl Question<'_> {
             let finite = finite && self.request.level != Level::Linear;
             let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
             let at = tool.patch_from_needle.translation.vector;
-            tool.patch_from_needle.translation.vector -= self.sunk(self.settled(sink, solid).as_ref(), [at.x, at.y]);
+            tool.patch_from_needle.translation.vector -=
+                self.sunk(self.settled(sink.change_kpa, solid).as_ref(), [at.x, at.y]);
         }
         tool
     }
 
     /// Adds to the reported penetration that of the patch's own nodes: a coarse face may cut a sharp edge between its quadrature points.
-    fn with_node_penetration(&self, mut answer: FiniteElementAnswer) -> FiniteElementAnswer {
+    pub(crate) fn with_node_penetration(&self, mut answer: FiniteElementAnswer) -> FiniteElementAnswer {
         let mut pose = self.tool.patch_from_needle;
         pose.translation.vector += self.motion.direction.into_inner() * answer.travel_mm;
         let penetration = |(vertex, moved): (&Point3<f64>, &Vector3<f64>)| {
@@ -314,7 +376,7 @@ impl Question<'_> {
     }
 
     /// Thickness of retina and choroid (mm).
-    fn yielding_mm(&self) -> f64 {
+    pub(crate) fn yielding_mm(&self) -> f64 {
         let tissue = &self.prepared.scene.tissue;
         tissue.retina_thickness_mm() + tissue.choroid.thickness_mm
     }
@@ -342,7 +404,7 @@ impl Question<'_> {
     }
 
     fn linear(&self, linear: &LinearAnswer, strain: f64, sink: &Sink) -> FiniteElementAnswer {
-        let settled = self.settled(sink, Solid::Elasticity);
+        let settled = self.settled(sink.change_kpa, Solid::Elasticity);
         let radius_mm = linear.contact_radius_mm;
         let travel_mm = if self.motion.force_mn.is_some() { linear.travel_mm() } else { 0.0 };
         let moved = |&parameter: &[f64; 2]| linear.displacement(parameter) + self.sunk(settled.as_ref(), parameter);
@@ -365,7 +427,7 @@ impl Question<'_> {
         }
     }
 
-    fn estimate(&self, linear: &LinearAnswer) -> ContactEstimate {
+    pub(crate) fn estimate(&self, linear: &LinearAnswer) -> ContactEstimate {
         ContactEstimate {
             center: linear.center,
             radius_mm: linear.contact_radius_mm,
@@ -375,7 +437,7 @@ impl Question<'_> {
     }
 
     /// Linear surface displacement, fading with depth as the layers share a uniform pressure.
-    fn start<'b>(&self, linear: &'b LinearAnswer) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
+    pub(crate) fn start<'b>(&self, linear: &'b LinearAnswer) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
         let layers = self.prepared.scene.tissue.layers();
         let compliance: Vec<f64> =
             layers.iter().map(|named| named.layer.thickness_mm / named.layer.youngs_modulus_kpa).collect();
@@ -390,7 +452,7 @@ impl Question<'_> {
         }
     }
 
-    fn problem(&self, decision: &Decision, sink: &Sink) -> Problem<'_> {
+    pub(crate) fn problem(&self, decision: &Decision, pressure_kpa: Option<f64>) -> Problem<'_> {
         Problem {
             patch: self.patch(),
             tissue: &self.prepared.scene.tissue,
@@ -398,16 +460,16 @@ impl Question<'_> {
             motion: self.motion,
             solid: decision.solid,
             friction_coefficient: decision.friction.then_some(self.prepared.scene.friction_coefficient),
-            pressure_kpa: sink.change_kpa,
+            pressure_kpa,
             bond: decision.adhesion.then_some(self.prepared.scene.tissue.bond),
         }
     }
 
-    fn coarse(
+    pub(crate) fn coarse(
         &self,
         linear: &LinearAnswer,
         decision: &Decision,
-        sink: &Sink,
+        change_kpa: Option<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
@@ -422,7 +484,7 @@ impl Question<'_> {
         let mut bench =
             Bench { level: Level::Coarse.name(), resolution: &COARSE, topology: &topology, workspace: solver };
         let start = self.start(linear);
-        self.problem(decision, sink).solve(&mut bench, &self.estimate(linear), &start, progress)
+        self.problem(decision, change_kpa).solve(&mut bench, &self.estimate(linear), &start, progress)
     }
 
     /// A finer answer than `coarse`, on a mesh made for the contact that `coarse` finds.
@@ -431,11 +493,11 @@ impl Question<'_> {
         resolution: &Resolution,
         linear: &LinearAnswer,
         decision: &Decision,
-        sink: &Sink,
+        change_kpa: Option<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
-        let coarse = self.coarse(linear, decision, sink, workspace, progress)?;
+        let coarse = self.coarse(linear, decision, change_kpa, workspace, progress)?;
         let topology = shared_topology(resolution.division(&self.prepared.scene.tissue, decision.adhesion))?;
         let mut solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
         let mut bench =
@@ -447,20 +509,20 @@ impl Question<'_> {
             ..self.estimate(linear)
         };
         let start = self.start(linear);
-        let mut answer = self.problem(decision, sink).solve(&mut bench, &aim, &start, progress)?;
+        let mut answer = self.problem(decision, change_kpa).solve(&mut bench, &aim, &start, progress)?;
         answer.solver.iterations += coarse.solver.iterations;
         Ok(answer)
     }
 
     /// The answer without contact: the surface at rest, or where the pressure moves it.
-    fn at_rest(&self, mut decision: Decision, sink: &Sink, reason: &str) -> Prediction {
+    pub(crate) fn at_rest(&self, mut decision: Decision, change_kpa: Option<f64>, reason: &str) -> Prediction {
         for report in &mut decision.reports {
             if [contact::NAME, friction::NAME, adhesion::NAME].contains(&report.name) {
                 report.simulated = false;
                 report.reason = reason.to_owned();
             }
         }
-        let settled = self.settled(sink, decision.solid);
+        let settled = self.settled(change_kpa, decision.solid);
         let moved = |&parameter: &[f64; 2]| self.sunk(settled.as_ref(), parameter);
         let answer = FiniteElementAnswer {
             displacements: self.patch().parameters.iter().map(moved).collect(),
@@ -478,11 +540,18 @@ impl Question<'_> {
             solver: SolverReport::default(),
             estimate: ContactEstimate { center: [0.0; 2], radius_mm: 0.0, touch_mm: 0.0, travel_mm: 0.0 },
         };
-        self.prediction(answer, decision)
+        // Nothing moves, exactly.
+        let expected = ExpectedError { median_um: 0.0, p95_um: 0.0, calibrated: true };
+        self.prediction(answer, decision, expected)
     }
 
     /// The answer in scene coordinates.
-    fn prediction(&self, answer: FiniteElementAnswer, decision: Decision) -> Prediction {
+    pub(crate) fn prediction(
+        &self,
+        answer: FiniteElementAnswer,
+        decision: Decision,
+        expected: ExpectedError,
+    ) -> Prediction {
         let patch = self.patch();
         let deformed: Vec<Point3<f64>> =
             patch.vertices.iter().zip(&answer.displacements).map(|(vertex, moved)| vertex + moved).collect();
@@ -514,6 +583,7 @@ impl Question<'_> {
             },
             contact: answer.contact,
             level: self.request.level,
+            expected_error: expected,
             effects: decision.reports,
             solver: answer.solver,
             warnings,

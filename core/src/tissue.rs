@@ -3,13 +3,15 @@
 //! Contract: a [`Tissue`] lists its layers from the vitreous outwards; [`Tissue::validate`] holds every number against the ranges of
 //! [`ranges`]. Units: mm, kPa; Poisson's ratio is a pure number.
 //!
-//! Not here: where the layers lie in space (`surface`), the energy of the material (`effect`), time dependence. Published moduli of
-//! the retina span 0.9 to 30 kPa by method, so every number is a scene parameter and none a constant.
+//! Not here: where the layers lie in space (`surface`), the energy of the material (`effect`). Published moduli of the retina
+//! span 0.9 to 30 kPa by method, so every number is a scene parameter and none a constant.
 
 pub mod ranges;
+pub mod rate;
 
 use crate::range::{OutOfRange, ParameterRange};
 use ranges::LayerRanges;
+use rate::RateProperties;
 
 /// One homogeneous, isotropic elastic layer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,6 +111,8 @@ pub struct Tissue {
     pub sclera: Layer,
     /// The bond between retina and choroid.
     pub bond: RetinalBond,
+    /// What depends on time.
+    pub rate: RateProperties,
 }
 
 /// Young's moduli of five layers of the rabbit retina in vivo, from the vitreous outwards, kPa (PMC5783626, acoustic radiation
@@ -124,6 +128,7 @@ impl Default for Tissue {
             choroid: ranges::CHOROID.default_layer(),
             sclera: ranges::SCLERA.default_layer(),
             bond: RetinalBond::default(),
+            rate: RateProperties::default(),
         }
     }
 }
@@ -174,6 +179,7 @@ impl Tissue {
         ranges::BOND_STRENGTH.check("tissue.bond.strength_kpa", self.bond.strength_kpa)?;
         let energy = self.bond.fracture_energy_mn_per_mm;
         ranges::FRACTURE_ENERGY.check("tissue.bond.fracture_energy_mn_per_mm", energy)?;
-        ranges::RETINA.thickness.check("tissue.retina.thickness_mm", self.retina_thickness_mm())
+        ranges::RETINA.thickness.check("tissue.retina.thickness_mm", self.retina_thickness_mm())?;
+        self.rate.validate()
     }
 }

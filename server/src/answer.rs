@@ -1,17 +1,32 @@
-//! One request, from bytes to bytes: read, understand, find the scene, predict, write.
+//! One request, from bytes to bytes: read, understand, find the scene, choose the level, predict, write.
 //!
 //! The same function answers over HTTP and on the command line.
 
-use retina_core::predict::{PreparedScene, Request, Workspace};
+use std::time::Instant;
+
+use retina_core::predict::budget::{Budget, DEFAULT_LEVEL};
+use retina_core::predict::{Prediction, PreparedScene, Request, Workspace};
 use retina_core::progress::Progress as _;
 
 use crate::problem::{Problem, from_predict};
 use crate::read::read;
 use crate::scenes::Scenes;
 use crate::stopwatch::Stopwatch;
+use crate::times::Times;
 use crate::understand;
 use crate::wire::{PredictRequest, PredictResponse};
 use crate::write::{Layout, write};
+
+/// An answer with what led to it.
+#[derive(Debug)]
+pub struct Answer {
+    /// The response.
+    pub bytes: Vec<u8>,
+    /// The question as it was understood.
+    pub request: Request,
+    /// What the core said.
+    pub prediction: Prediction,
+}
 
 /// The answer to the request in `body`.
 ///
@@ -20,14 +35,26 @@ use crate::write::{Layout, write};
 pub fn answer(
     body: &[u8],
     scenes: &Scenes,
+    times: &Times,
     workspace: &mut Workspace,
     stopwatch: &mut Stopwatch,
-) -> Result<Vec<u8>, Problem> {
+) -> Result<Answer, Problem> {
     let message: PredictRequest = read(body)?;
     let request = understand::request(&message)?;
+    let budget = understand::budget(message.accuracy.as_ref())?;
     stopwatch.stage("prepare");
     let scene = scenes.get(message.scene.as_ref())?;
-    predict(&scene, &request, workspace, stopwatch, Layout::Compact)
+    predict(&scene, Question { request, budget, times }, workspace, stopwatch, Layout::Compact)
+}
+
+/// A request that is understood, and what its answer must keep.
+pub struct Question<'a> {
+    /// The request; its level is the budget's choice.
+    pub request: Request,
+    /// What the answer must keep.
+    pub budget: Budget,
+    /// How long the levels take.
+    pub times: &'a Times,
 }
 
 /// The answer to a request that is understood, in a scene that is prepared.
@@ -36,12 +63,30 @@ pub fn answer(
 /// The problem that the caller is told of.
 pub fn predict(
     scene: &PreparedScene,
-    request: &Request,
+    question: Question,
     workspace: &mut Workspace,
     stopwatch: &mut Stopwatch,
     layout: Layout,
-) -> Result<Vec<u8>, Problem> {
-    let prediction = scene.predict(request, workspace, stopwatch).map_err(from_predict)?;
+) -> Result<Answer, Problem> {
+    let Question { mut request, mut budget, times } = question;
+    let mut broken = Vec::new();
+    request.level = match budget.level {
+        Some(level) if !budget.promises() => level,
+        None if !budget.promises() => DEFAULT_LEVEL,
+        _ => {
+            stopwatch.stage("choose");
+            let spent_ms = stopwatch.elapsed().as_secs_f64() * 1e3;
+            budget.max_time_ms = budget.max_time_ms.map(|most| (most - spent_ms).max(0.0));
+            let choice = scene.choose(&request, &budget, &times.expected_ms()).map_err(from_predict)?;
+            broken = choice.broken;
+            choice.level
+        }
+    };
+    let start = Instant::now();
+    let mut prediction = scene.predict(&request, workspace, stopwatch).map_err(from_predict)?;
+    times.record(request.level, start.elapsed());
+    prediction.warnings.append(&mut broken);
     let response = PredictResponse::new(&prediction, stopwatch.finish());
-    write(&response, layout).map_err(Problem::internal)
+    let bytes = write(&response, layout).map_err(Problem::internal)?;
+    Ok(Answer { bytes, request, prediction })
 }

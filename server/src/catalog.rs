@@ -4,20 +4,25 @@ use retina_core::needle::shape::{BEVEL_ANGLE, EDGE_RADIUS, RADIUS};
 use retina_core::needle::{GAUGES, TIP_COORDINATE};
 use retina_core::patch::{NODES_PER_SIDE, SPACING_MM};
 use retina_core::predict::Level;
+use retina_core::predict::budget::DEFAULT_LEVEL;
 use retina_core::range::ParameterRange;
 use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
 use retina_core::scene::{Scene, SceneSurface};
+use retina_core::sequence::TIME_STEP;
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
 use retina_core::tissue::ranges::{
     BOND_STRENGTH, CHOROID, FRACTURE_ENERGY, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA,
 };
+use retina_core::tissue::rate::{DENSITY, PronyTerm, RELAXATION_SHARE, RELAXATION_TIME, RateProperties, VITREOUS_DRAG};
 use retina_core::tissue::{Layer, Tissue};
 
-use crate::understand::{DEFAULT_GAUGE, DEFAULT_LEVEL, DEFAULT_SCENE, FORCE};
+use crate::understand::{DEFAULT_GAUGE, DEFAULT_SCENE, FORCE, MAX_ERROR, MAX_TIME};
 use crate::wire::catalog::{
     GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
 };
-use crate::wire::scene::{BondSpec, LayerSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec};
+use crate::wire::scene::{
+    BondSpec, LayerSpec, PronyTermSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec,
+};
 
 /// The built-in scenes, and every parameter with its range.
 pub fn scenes() -> SceneList {
@@ -111,12 +116,24 @@ fn tissue(tissue: &Tissue) -> TissueSpec {
             strength_kpa: Some(tissue.bond.strength_kpa),
             fracture_energy_mn_per_mm: Some(tissue.bond.fracture_energy_mn_per_mm),
         }),
+        rate: Some(rate(&tissue.rate)),
+    }
+}
+
+fn rate(rate: &RateProperties) -> RateSpec {
+    let term = |term: &PronyTerm| PronyTermSpec { relaxation_time_s: term.relaxation_time_s, share: term.share };
+    RateSpec {
+        retina_relaxation: Some(rate.retina_relaxation.iter().map(term).collect()),
+        density_kg_per_mm3: Some(rate.density_kg_per_mm3),
+        vitreous_drag_kpa_s_per_mm: Some(rate.vitreous_drag_kpa_s_per_mm),
     }
 }
 
 fn parameters() -> Vec<ParameterEntry> {
     let single = [
         ("force_mn", &FORCE),
+        ("accuracy.max_error_um", &MAX_ERROR),
+        ("accuracy.max_time_ms", &MAX_TIME),
         ("needle.tip_mm", &TIP_COORDINATE),
         ("needle.radius_mm", &RADIUS),
         ("needle.tip.flat.edge_radius_mm", &EDGE_RADIUS),
@@ -128,6 +145,11 @@ fn parameters() -> Vec<ParameterEntry> {
         ("scene.pose.position_mm", &TIP_COORDINATE),
         ("scene.tissue.bond.strength_kpa", &BOND_STRENGTH),
         ("scene.tissue.bond.fracture_energy_mn_per_mm", &FRACTURE_ENERGY),
+        ("scene.tissue.rate.retina_relaxation[].relaxation_time_s", &RELAXATION_TIME),
+        ("scene.tissue.rate.retina_relaxation[].share", &RELAXATION_SHARE),
+        ("scene.tissue.rate.density_kg_per_mm3", &DENSITY),
+        ("scene.tissue.rate.vitreous_drag_kpa_s_per_mm", &VITREOUS_DRAG),
+        ("steps[].time_s", &TIME_STEP),
         ("scene.friction_coefficient", &FRICTION_COEFFICIENT),
         ("scene.pressure_kpa", &EYE_PRESSURE),
         ("scene.rest_pressure_kpa", &EYE_PRESSURE),

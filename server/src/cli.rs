@@ -1,7 +1,8 @@
-//! The program: serve, or answer one request from a file.
+//! The program: serve, answer one request from a file, simulate one sequence, or review a level.
 //!
 //! Contract of `predict`: the response goes to standard output and is that of `POST /v1/predict`; a problem goes to standard error as the
-//! same document that HTTP has, and the program ends with 1. The command line is at fault: 2.
+//! same document that HTTP has, and the program ends with 1. The command line is at fault: 2. `simulate` is the same line by line; a
+//! sequence that breaks off has its error as last line and ends with 1.
 
 use std::fs;
 use std::io::{self, IsTerminal as _, Read, Write};
@@ -18,15 +19,24 @@ use retina_core::surface::mesh_file::{MeshFormat, read_mesh};
 use tokio_util::sync::CancellationToken;
 use tracing_subscriber::EnvFilter;
 
-use crate::answer::predict;
-use crate::config::{Command, CommandLine, Config, LogForm, PredictArgs};
+use crate::answer::{Question, predict};
+use crate::config::{Command, CommandLine, Config, LogForm, PredictArgs, ReviewArgs, SimulateArgs};
 use crate::problem::{Kind, Problem, from_predict};
 use crate::read::read;
+use crate::recording::{self, Recorder, Totals};
+use crate::simulate::{Line, simulate_in};
 use crate::stopwatch::Stopwatch;
+use crate::times::Times;
 use crate::understand;
-use crate::wire::PredictRequest;
+use crate::wire::{PredictRequest, SimulateRequest};
 use crate::write::Layout;
-use crate::{App, run};
+use crate::{App, page, run};
+
+/// Exit code where the command line asks for what cannot be.
+const COMMAND_LINE_AT_FAULT: u8 = 2;
+
+/// How long what was answered may still take to be recorded after the service has ended.
+const RECORDING_PATIENCE: Duration = Duration::from_secs(10);
 
 /// Where the program reads from and writes to.
 pub struct Streams<'a> {
@@ -49,6 +59,14 @@ pub fn main() -> ExitCode {
                 Err(_) => ExitCode::FAILURE,
             }
         }
+        Some(Command::Review(args)) => review(&args),
+        Some(Command::Simulate(args)) => {
+            let streams = Streams { input: &mut io::stdin(), output: &mut io::stdout(), problems: &mut io::stderr() };
+            match simulate_file(&args, streams) {
+                Ok(code) => ExitCode::from(code),
+                Err(_) => ExitCode::FAILURE,
+            }
+        }
         Some(Command::Serve(config)) => serve(&config),
         None => serve(&config),
     }
@@ -56,7 +74,19 @@ pub fn main() -> ExitCode {
 
 fn serve(config: &Config) -> ExitCode {
     start_log(config.log);
-    match serve_until_ctrl_c(config) {
+    let recorder = match config.recording().map(|destination| recording::start(&destination)).transpose() {
+        Ok(recorder) => recorder,
+        Err(error) => {
+            tracing::error!(%error, "not started");
+            return ExitCode::from(COMMAND_LINE_AT_FAULT);
+        }
+    };
+    let ended = serve_until_ctrl_c(config, recorder.clone());
+    if let Some(recorder) = recorder {
+        let Totals { written, dropped, failed, closed } = recorder.finish(RECORDING_PATIENCE);
+        tracing::info!(written, dropped, failed, complete = closed, "the recording ended");
+    }
+    match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             tracing::error!(%error, listen = %config.listen, "the service ended");
@@ -67,10 +97,13 @@ fn serve(config: &Config) -> ExitCode {
 
 /// One thread talks: the numerical threads do the work, and handing it to one of several talking threads costs a wake-up more.
 #[tokio::main(flavor = "current_thread")]
-async fn serve_until_ctrl_c(config: &Config) -> io::Result<()> {
+async fn serve_until_ctrl_c(config: &Config, recorder: Option<Recorder>) -> io::Result<()> {
     let listener = tokio::net::TcpListener::bind(config.listen).await?;
     let address = listener.local_addr()?;
-    tracing::info!("listening on http://{address}, try http://{address}/docs");
+    tracing::info!("listening on http://{address}, the API is at http://{address}/docs");
+    if let Some(reason) = page::missing() {
+        tracing::warn!(reason, "no page at http://{address}/, which says how to get it; the API works without");
+    }
     let shutdown = CancellationToken::new();
     let stop = shutdown.clone();
     tokio::spawn(async move {
@@ -80,7 +113,19 @@ async fn serve_until_ctrl_c(config: &Config) -> io::Result<()> {
             stop.cancel();
         }
     });
-    run(listener, App::start(config)?, shutdown).await
+    run(listener, App::start_recorded(config, recorder)?, shutdown).await
+}
+
+#[cfg(feature = "rerun")]
+fn review(args: &ReviewArgs) -> ExitCode {
+    start_log(LogForm::Pretty);
+    crate::review::main(args)
+}
+
+#[cfg(not(feature = "rerun"))]
+fn review(_args: &ReviewArgs) -> ExitCode {
+    eprintln!("retina-server review: {}", recording::RecordingError::NotBuilt);
+    ExitCode::from(COMMAND_LINE_AT_FAULT)
 }
 
 fn start_log(form: LogForm) {
@@ -101,7 +146,7 @@ pub fn predict_file(args: &PredictArgs, streams: Streams) -> io::Result<u8> {
         Ok(body) => body,
         Err(error) => {
             writeln!(streams.problems, "{}: {error}", args.request.display())?;
-            return Ok(2);
+            return Ok(COMMAND_LINE_AT_FAULT);
         }
     };
     let layout = match args.pretty {
@@ -122,6 +167,45 @@ pub fn predict_file(args: &PredictArgs, streams: Streams) -> io::Result<u8> {
     }
 }
 
+/// `retina-server simulate`; returns the exit code.
+///
+/// # Errors
+/// If a stream cannot be written.
+pub fn simulate_file(args: &SimulateArgs, streams: Streams) -> io::Result<u8> {
+    let body = match read_input(&args.request, streams.input) {
+        Ok(body) => body,
+        Err(error) => {
+            writeln!(streams.problems, "{}: {error}", args.request.display())?;
+            return Ok(2);
+        }
+    };
+    let Streams { output, problems, .. } = streams;
+    let mut stopwatch = Stopwatch::start(Instant::now(), Duration::MAX / 4, &|| false);
+    let (mut code, mut written) = (1, Ok(()));
+    let mut tell = |line: Line| {
+        written = match line {
+            Line::Refused(problem) => serde_json::to_writer_pretty(&mut *problems, &problem.document())
+                .map_err(io::Error::from)
+                .and_then(|()| writeln!(problems)),
+            Line::Going(bytes) => output.write_all(&bytes).and_then(|()| output.flush()),
+            Line::Last { bytes, complete } => {
+                code = u8::from(!complete);
+                output.write_all(&bytes)
+            }
+        };
+        written.is_ok()
+    };
+    let scene = |message: &SimulateRequest| {
+        let mut scene = understand::chosen(message.scene.as_ref())?;
+        if let Some(path) = &args.mesh {
+            replace_surface(&mut scene, path)?;
+        }
+        PreparedScene::new(scene).map(Arc::new).map_err(from_predict)
+    };
+    simulate_in(&body, scene, usize::MAX, &mut stopwatch, &mut tell);
+    written.map(|()| code)
+}
+
 fn read_input(path: &Path, input: &mut dyn Read) -> io::Result<Vec<u8>> {
     if path == Path::new("-") {
         let mut bytes = Vec::new();
@@ -135,13 +219,15 @@ fn answer(body: &[u8], mesh: Option<&Path>, layout: Layout) -> Result<Vec<u8>, P
     let mut stopwatch = Stopwatch::start(Instant::now(), Duration::MAX / 4, &|| false);
     let message: PredictRequest = read(body)?;
     let request = understand::request(&message)?;
+    let budget = understand::budget(message.accuracy.as_ref())?;
     let mut scene = understand::chosen(message.scene.as_ref())?;
     if let Some(path) = mesh {
         replace_surface(&mut scene, path)?;
     }
     stopwatch.stage("prepare");
     let scene = PreparedScene::new(scene).map_err(from_predict)?;
-    predict(&scene, &request, &mut Workspace::default(), &mut stopwatch, layout)
+    let question = Question { request, budget, times: &Times::default() };
+    predict(&scene, question, &mut Workspace::default(), &mut stopwatch, layout).map(|answer| answer.bytes)
 }
 
 fn replace_surface(scene: &mut Scene, path: &Path) -> Result<(), Problem> {

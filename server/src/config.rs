@@ -6,6 +6,10 @@ use std::thread::available_parallelism;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use retina_core::predict::Level;
+
+use crate::recording::Destination;
+use crate::understand::DEFAULT_SCENE;
 
 /// Needle pose and force in, deformed retina surface and normals out.
 #[derive(Debug, Parser)]
@@ -26,6 +30,10 @@ pub enum Command {
     Serve(Config),
     /// Answer one request from a file and end: the response goes to standard output, a problem to standard error.
     Predict(PredictArgs),
+    /// Compare a level with the ground truth on random requests, for the rerun viewer (cargo feature `rerun`).
+    Review(ReviewArgs),
+    /// Simulate a sequence from a file and end: one JSON object a line goes to standard output as it is computed.
+    Simulate(SimulateArgs),
 }
 
 /// How to serve.
@@ -46,9 +54,21 @@ pub struct Config {
     /// Milliseconds after which the work on a request is stopped.
     #[arg(long, env = "RETINA_TIME_LIMIT_MS", default_value_t = 30_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub time_limit_ms: u32,
+    /// Steps that a simulation may have.
+    #[arg(long, env = "RETINA_SIMULATION_STEPS", default_value_t = 2000, value_parser = clap::value_parser!(u16).range(1..))]
+    pub simulation_steps: u16,
+    /// Milliseconds after which a simulation is stopped.
+    #[arg(long, env = "RETINA_SIMULATION_TIME_LIMIT_MS", default_value_t = 300_000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub simulation_time_limit_ms: u32,
     /// Form of the log on standard error. RUST_LOG says what is logged; `retina_server=debug` has a line for each request.
     #[arg(long, env = "RETINA_LOG", default_value = "pretty")]
     pub log: LogForm,
+    /// Record what is asked and answered in this file, for the rerun viewer (cargo feature `rerun`).
+    #[arg(long, env = "RETINA_RECORD", value_name = "FILE.rrd", conflicts_with = "record_connect")]
+    pub record: Option<PathBuf>,
+    /// Record to a running viewer, as rerun+http://127.0.0.1:9876/proxy (cargo feature `rerun`).
+    #[arg(long, env = "RETINA_RECORD_CONNECT", value_name = "URL")]
+    pub record_connect: Option<String>,
 }
 
 /// Form of the log.
@@ -73,7 +93,90 @@ pub struct PredictArgs {
     pub pretty: bool,
 }
 
+/// A comparison with the ground truth.
+#[derive(Clone, Debug, Args)]
+pub struct ReviewArgs {
+    /// Built-in scene.
+    #[arg(long, default_value = DEFAULT_SCENE)]
+    pub scene: String,
+    /// Requests to compare. The ground truth takes seconds for each.
+    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub count: u32,
+    /// Every request follows from it.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// The level that is compared with `reference`.
+    #[arg(long, default_value = "coarse", value_parser = level)]
+    pub level: Level,
+    /// Tips of the needles.
+    #[arg(long, default_value = "any")]
+    pub tip: TipChoice,
+    /// Where the recording goes.
+    #[command(flatten)]
+    pub destination: ReviewDestination,
+}
+
+/// Exactly one place for a review.
+#[derive(Clone, Debug, Args)]
+#[group(required = true, multiple = false)]
+pub struct ReviewDestination {
+    /// File that `rerun FILE.rrd` opens; what is in it is lost.
+    #[arg(long, value_name = "FILE.rrd")]
+    pub save: Option<PathBuf>,
+    /// A running viewer, as rerun+http://127.0.0.1:9876/proxy.
+    #[arg(long, value_name = "URL")]
+    pub connect: Option<String>,
+}
+
+/// Tips of the needles of a review.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TipChoice {
+    /// Half of them hemispherical, the others flat or bevelled.
+    Any,
+    /// Half a ball.
+    Hemispherical,
+    /// A plane across the shaft.
+    Flat,
+    /// A plane oblique to the shaft.
+    Bevelled,
+}
+
+fn level(name: &str) -> Result<Level, String> {
+    let compared = || Level::ALL.into_iter().filter(|level| *level != Level::Reference);
+    compared().find(|level| level.name() == name).ok_or_else(|| {
+        let known: Vec<&str> = compared().map(Level::name).collect();
+        format!("levels that can be compared are {}", known.join(", "))
+    })
+}
+
+fn destination(file: Option<&PathBuf>, viewer: Option<&String>) -> Option<Destination> {
+    let file = file.cloned().map(Destination::File);
+    file.or_else(|| viewer.cloned().map(Destination::Viewer))
+}
+
+impl ReviewDestination {
+    /// The place; `None` where neither is given, which the command line refuses.
+    pub fn chosen(&self) -> Option<Destination> {
+        destination(self.save.as_ref(), self.connect.as_ref())
+    }
+}
+
+/// One sequence without HTTP.
+#[derive(Debug, Args)]
+pub struct SimulateArgs {
+    /// File with the request that `POST /v1/simulate` takes; `-` is standard input.
+    pub request: PathBuf,
+    /// A mesh in mm (.ply, text or binary, or .obj) in place of the scene's surface.
+    #[arg(long)]
+    pub mesh: Option<PathBuf>,
+}
+
 impl Config {
+    /// Where to record what is asked and answered.
+    pub fn recording(&self) -> Option<Destination> {
+        destination(self.record.as_ref(), self.record_connect.as_ref())
+    }
+
     /// Numerical threads.
     pub fn threads(&self) -> usize {
         let cores = || available_parallelism().map_or(1, usize::from);
@@ -88,5 +191,10 @@ impl Config {
     /// How long the work on a request may take.
     pub fn time_limit(&self) -> Duration {
         Duration::from_millis(self.time_limit_ms.into())
+    }
+
+    /// How long a simulation may take.
+    pub fn simulation_time_limit(&self) -> Duration {
+        Duration::from_millis(self.simulation_time_limit_ms.into())
     }
 }

@@ -5,12 +5,14 @@ use axum::body::Body;
 use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, Method, Uri, header};
-use axum::response::{Html, IntoResponse, Response};
+use axum::response::{IntoResponse, Response};
 
 use crate::catalog;
 use crate::problem::{Kind, MEDIA_TYPE, Problem, ProblemDocument};
 use crate::state::AppState;
-use crate::wire::{GaugeList, LevelList, PredictRequest, PredictResponse, Readiness, SceneList};
+use crate::wire::{
+    GaugeList, LevelList, PredictRequest, PredictResponse, Readiness, SceneList, SimulateLine, SimulateRequest,
+};
 
 /// What the surface looks like when a needle at this pose pushes with this force.
 #[utoipa::path(
@@ -32,6 +34,31 @@ use crate::wire::{GaugeList, LevelList, PredictRequest, PredictResponse, Readine
 pub async fn predict(State(app): State<AppState>, headers: HeaderMap, body: Body) -> Result<Response, Problem> {
     let answer = app.answer(&headers, body).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], answer).into_response())
+}
+
+/// A timed list of needle poses and forces in, surfaces out: one JSON object a line, each as soon as it is computed.
+///
+/// The first line is `begin`, then one `step` each, and at last `end`; a step without an answer ends the list with `error`, which names step, time
+/// and cause. Closing the connection stops the work.
+#[utoipa::path(
+    post,
+    path = "/v1/simulate",
+    tag = "simulate",
+    request_body = SimulateRequest,
+    responses(
+        (status = 200, description = "One object a line", body = SimulateLine<'static>, content_type = "application/x-ndjson"),
+        (status = 400, description = "Not JSON", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 408, description = "The body did not arrive in time", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 413, description = "Larger than 8 MiB", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 415, description = "Not announced as JSON", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 422, description = "A field is wrong, there are too many steps, or a step cannot be", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 500, description = "A fault of the server", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 503, description = "Too much work is waiting", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+    )
+)]
+pub async fn simulate(State(app): State<AppState>, headers: HeaderMap, body: Body) -> Result<Response, Problem> {
+    let lines = app.simulate(&headers, body).await?;
+    Ok(([(header::CONTENT_TYPE, "application/x-ndjson")], lines).into_response())
 }
 
 /// The built-in scenes, and every parameter of a scene with its default, range and source.
@@ -93,11 +120,6 @@ pub async fn problem(name: Result<Path<String>, PathRejection>) -> Result<String
         Problem::new(Kind::NotFound, format!("There is no such problem; known are {}.", known.join(", ")))
     })?;
     Ok(format!("{} ({})\n\n{}\n", kind.title(), kind.status(), kind.explanation()))
-}
-
-/// A page that links to what there is.
-pub async fn index() -> Html<&'static str> {
-    Html(include_str!("../assets/index.html"))
 }
 
 /// For a URL that there is not.

@@ -1,8 +1,9 @@
 //! The service: needle pose and force in, deformed retina surface and normals out, over HTTP or from a file.
 //!
 //! Read in this order: `routes` (every URL), `handlers`, [`wire`] (every message), `understand` (from the wire to the core),
-//! `answer` (one request from bytes to bytes), `pool` and `scenes` (where it runs and what is kept). [`config`] is what the
-//! program can be told, [`problem`] how it says no.
+//! `answer` (one request from bytes to bytes), `simulate` (one sequence, line by line), `pool` and `scenes` (where it runs and what
+//! is kept), [`page`] (what a browser sees). [`config`] is what the program can be told, [`problem`] how it says no. [`recording`] is a
+//! guest that looks on, `review` compares levels for the eye.
 //!
 //! Not here: numerics, which are `retina_core`'s; this crate only brings questions to it and answers back.
 
@@ -12,14 +13,20 @@ mod catalog;
 pub mod cli;
 pub mod config;
 mod handlers;
+pub mod page;
 pub mod pool;
 pub mod problem;
 mod read;
+pub mod recording;
+#[cfg(feature = "rerun")]
+pub mod review;
 mod routes;
 mod run;
 pub mod scenes;
+mod simulate;
 mod state;
 mod stopwatch;
+mod times;
 mod understand;
 pub mod wire;
 pub mod write;

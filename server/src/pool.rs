@@ -63,20 +63,28 @@ impl Pool {
         job: impl FnOnce(&mut Workspace, &dyn Fn() -> bool) -> T + Send + 'static,
     ) -> Result<T, PoolError> {
         let (reply, result) = oneshot::channel();
-        let span = Span::current();
-        let job = Box::new(move |workspace: &mut Workspace| {
+        self.begin(move |workspace| {
             if reply.is_closed() {
                 return;
             }
-            let value = span.in_scope(|| job(workspace, &|| reply.is_closed()));
+            let value = job(workspace, &|| reply.is_closed());
             // The caller may have gone meanwhile; then nobody wants the value.
             let _ = reply.send(value);
-        });
+        })?;
+        result.await.map_err(|_| PoolError::Panicked)
+    }
+
+    /// Begins `job` as soon as a thread is free, without waiting for it. What it has to tell it tells by itself.
+    ///
+    /// # Errors
+    /// [`PoolError`].
+    pub fn begin(&self, job: impl FnOnce(&mut Workspace) + Send + 'static) -> Result<(), PoolError> {
+        let span = Span::current();
+        let job = Box::new(move |workspace: &mut Workspace| span.in_scope(|| job(workspace)));
         self.queue.try_send(job).map_err(|error| match error {
             TrySendError::Full(_) => PoolError::Full,
             TrySendError::Disconnected(_) => PoolError::Panicked,
-        })?;
-        result.await.map_err(|_| PoolError::Panicked)
+        })
     }
 }
 

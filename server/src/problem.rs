@@ -5,6 +5,7 @@
 
 mod kind;
 mod predict;
+mod sequence;
 
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
@@ -14,6 +15,7 @@ use utoipa::ToSchema;
 
 pub use kind::Kind;
 pub use predict::{from_out_of_range, from_predict};
+pub use sequence::from_sequence;
 
 /// Media type of a problem document.
 pub const MEDIA_TYPE: &str = "application/problem+json";

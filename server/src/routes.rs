@@ -15,6 +15,7 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
 use crate::handlers;
+use crate::page;
 use crate::state::AppState;
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
@@ -32,6 +33,7 @@ struct Description;
 pub fn app(state: AppState) -> Router {
     let (routes, api) = OpenApiRouter::with_openapi(Description::openapi())
         .routes(routes!(handlers::predict))
+        .routes(routes!(handlers::simulate))
         .routes(routes!(handlers::scenes))
         .routes(routes!(handlers::levels))
         .routes(routes!(handlers::gauges))
@@ -49,7 +51,8 @@ pub fn app(state: AppState) -> Router {
         })
         .on_failure(());
     routes
-        .route("/", get(handlers::index))
+        .route("/", get(page::index))
+        .route("/assets/{name}", get(page::asset))
         .route("/openapi.json", get(|| async { Json(api) }))
         .merge(SwaggerUi::new("/docs").config(docs))
         .fallback(handlers::not_found)

@@ -9,17 +9,21 @@ use axum::http::HeaderMap;
 use nalgebra::{Point3, Vector3};
 use retina_core::needle::shape::RADIUS;
 use retina_core::needle::{Needle, NeedleShape};
+use retina_core::predict::budget::Budget;
 use retina_core::predict::{Control, EffectChoice, Level, Request, Workspace};
 use retina_core::scene::Scene;
-use tokio::sync::Semaphore;
+use tokio::sync::{Semaphore, mpsc};
 
-use crate::answer::{answer, predict};
+use crate::answer::{Question, answer, predict};
 use crate::body::{self, LARGE_AT_ONCE};
 use crate::config::Config;
 use crate::pool::{Pool, PoolError};
 use crate::problem::{Kind, Problem};
+use crate::recording::Recorder;
 use crate::scenes::Scenes;
+use crate::simulate::{FIRST_AND_LAST, Limits, Lines, simulate};
 use crate::stopwatch::Stopwatch;
+use crate::times::Times;
 use crate::wire::request::SceneChoice;
 use crate::write::Layout;
 
@@ -38,22 +42,35 @@ pub struct App {
     pool: Pool,
     large_bodies: Arc<Semaphore>,
     warm_up: Arc<OnceLock<Result<(), Problem>>>,
+    times: Arc<Times>,
     time_limit: Duration,
+    recorder: Option<Recorder>,
+    simulations: Arc<Semaphore>,
+    simulation_limits: Limits,
 }
 
 impl App {
-    /// Starts the numerical threads and the warm-up on the first of them.
+    /// Starts the numerical threads and the warm-up on the first of them. Nothing is recorded.
     ///
     /// # Errors
     /// If the system gives no threads.
     pub fn start(config: &Config) -> io::Result<AppState> {
+        Self::start_recorded(config, None)
+    }
+
+    /// As [`App::start`], and hands what is asked and answered to the recorder; its owner finishes it when the service has ended.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn start_recorded(config: &Config, recorder: Option<Recorder>) -> io::Result<AppState> {
         let scenes = Arc::new(Scenes::new(config.scene_cache_bytes()));
         let warm_up = Arc::new(OnceLock::new());
         let time_limit = config.time_limit();
+        let times = Arc::new(Times::default());
         let first = {
-            let (scenes, outcome) = (Arc::clone(&scenes), Arc::clone(&warm_up));
+            let (scenes, times, outcome) = (Arc::clone(&scenes), Arc::clone(&times), Arc::clone(&warm_up));
             move |workspace: &mut Workspace| {
-                let result = prepare_built_in(&scenes, workspace);
+                let result = prepare_built_in(&scenes, &times, workspace);
                 if let Err(problem) = &result {
                     tracing::error!(detail = %problem.detail, "the built-in scenes could not be prepared");
                 }
@@ -66,7 +83,12 @@ impl App {
             large_bodies: Arc::new(Semaphore::new(LARGE_AT_ONCE)),
             scenes,
             warm_up,
+            times,
             time_limit,
+            recorder,
+            // One thread stays for predictions, where there are several.
+            simulations: Arc::new(Semaphore::new(config.threads().saturating_sub(1).max(1))),
+            simulation_limits: Limits { steps: config.simulation_steps.into(), time: config.simulation_time_limit() },
         }))
     }
 
@@ -77,19 +99,47 @@ impl App {
     pub async fn answer(&self, headers: &HeaderMap, body: Body) -> Result<Vec<u8>, Problem> {
         let body = body::json(headers, body, &self.large_bodies).await?;
         let accepted = Instant::now();
-        let (scenes, limit) = (Arc::clone(&self.scenes), self.time_limit);
+        let (scenes, times, limit) = (Arc::clone(&self.scenes), Arc::clone(&self.times), self.time_limit);
+        let recorder = self.recorder.clone();
         let job = move |workspace: &mut Workspace, abandoned: &dyn Fn() -> bool| {
             let mut stopwatch = Stopwatch::start(accepted, limit, abandoned);
-            answer(body.as_ref(), &scenes, workspace, &mut stopwatch)
+            let answer = answer(body.as_ref(), &scenes, &times, workspace, &mut stopwatch);
+            match recorder {
+                Some(recorder) => recorder.record(body.as_ref(), accepted, answer),
+                None => answer.map(|answer| answer.bytes),
+            }
         };
-        self.pool.run(job).await.unwrap_or_else(|error| {
-            Err(match error {
-                PoolError::Full => {
-                    Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
-                }
-                PoolError::Panicked => Problem::internal(error),
-            })
+        self.pool.run(job).await.unwrap_or_else(|error| match &self.recorder {
+            Some(recorder) => recorder.record(b"", accepted, Err(from_pool(error))),
+            None => Err(from_pool(error)),
         })
+    }
+
+    /// Simulates the sequence whose body is on its way: the lines of the answer, each as soon as it is there. The work ends when the
+    /// answer is dropped.
+    ///
+    /// # Errors
+    /// The problem of a sequence that does not begin.
+    pub async fn simulate(&self, headers: &HeaderMap, body: Body) -> Result<Body, Problem> {
+        let body = body::json(headers, body, &self.large_bodies).await?;
+        let permit = Arc::clone(&self.simulations).try_acquire_owned().map_err(|_| {
+            Problem::new(
+                Kind::Busy,
+                "As many simulations as the service has threads for are at work; try again in a second.",
+            )
+        })?;
+        let accepted = Instant::now();
+        let (scenes, limits) = (Arc::clone(&self.scenes), self.simulation_limits);
+        // Room for every line: a client that reads slowly does not hold a thread.
+        let (sender, lines) = mpsc::channel(limits.steps + FIRST_AND_LAST);
+        let job = move |_: &mut Workspace| {
+            let gone = || sender.is_closed();
+            let mut stopwatch = Stopwatch::start(accepted, limits.time, &gone);
+            // A line that finds no room has lost its reader.
+            simulate(body.as_ref(), &scenes, limits.steps, &mut stopwatch, &mut |line| sender.try_send(line).is_ok());
+        };
+        self.pool.begin(job).map_err(from_pool)?;
+        Lines::new(lines, permit).body().await
     }
 
     /// Whether every built-in scene has answered at the levels that a simulator uses.
@@ -108,8 +158,17 @@ impl App {
     }
 }
 
+fn from_pool(error: PoolError) -> Problem {
+    match error {
+        PoolError::Full => {
+            Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
+        }
+        PoolError::Panicked => Problem::internal(error),
+    }
+}
+
 /// A light touch on every built-in scene, so that what depends on the scene alone is there before the first request.
-fn prepare_built_in(scenes: &Scenes, workspace: &mut Workspace) -> Result<(), Problem> {
+fn prepare_built_in(scenes: &Scenes, times: &Times, workspace: &mut Workspace) -> Result<(), Problem> {
     let shape = NeedleShape::hemispherical(RADIUS.default);
     let needle = Needle::pointing(shape, Point3::origin(), &-Vector3::z_axis());
     for name in Scene::built_in_names() {
@@ -121,8 +180,9 @@ fn prepare_built_in(scenes: &Scenes, workspace: &mut Workspace) -> Result<(), Pr
                 level,
                 effects: EffectChoice::Auto,
             };
+            let budget = Budget { level: Some(level), ..Budget::default() };
             let mut stopwatch = Stopwatch::start(Instant::now(), WARM_UP_LIMIT, &|| false);
-            predict(&scene, &request, workspace, &mut stopwatch, Layout::Compact)?;
+            predict(&scene, Question { request, budget, times }, workspace, &mut stopwatch, Layout::Compact)?;
         }
     }
     Ok(())

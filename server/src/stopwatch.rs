@@ -22,10 +22,22 @@ impl<'a> Stopwatch<'a> {
         Self { stages: vec![("queue", now - accepted)], current: "read", since: now, deadline: now + limit, abandoned }
     }
 
+    /// Time since the request was accepted.
+    pub fn elapsed(&self) -> Duration {
+        self.stages.iter().map(|(_, time)| *time).sum::<Duration>() + self.since.elapsed()
+    }
+
     /// Ends the last stage; the stages so far with their times.
     pub fn finish(&mut self) -> &[(&'static str, Duration)] {
         self.lap();
         &self.stages
+    }
+
+    /// Ends the last stage; gives the stages so far away and goes on with `next`.
+    pub fn take(&mut self, next: &'static str) -> Vec<(&'static str, Duration)> {
+        self.lap();
+        self.current = next;
+        std::mem::take(&mut self.stages)
     }
 
     /// A stage that comes again adds to its first time.

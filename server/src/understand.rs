@@ -6,14 +6,17 @@
 
 mod needle;
 mod scene;
+mod sequence;
 
 use nalgebra::Vector3;
 use retina_core::effects::EFFECT_NAMES;
+use retina_core::predict::budget::{Budget, DEFAULT_LEVEL};
 use retina_core::predict::{Control, EffectChoice, Level, Request};
 use retina_core::range::ParameterRange;
 use serde_json::json;
 
 pub use scene::{built_in, chosen, scene};
+pub use sequence::sequence;
 
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::Vector;
@@ -22,8 +25,25 @@ use crate::wire::request::{AccuracySpec, ControlName, EffectsSpec, PredictReques
 /// The scene of a request that names none.
 pub const DEFAULT_SCENE: &str = "macula";
 
-/// The level of a request that names none.
-pub const DEFAULT_LEVEL: Level = Level::Coarse;
+/// What may be asked of the error.
+pub const MAX_ERROR: ParameterRange = ParameterRange {
+    name: "largest error of the worst node",
+    unit: "um",
+    default: 5.0,
+    min: 0.01,
+    max: 1000.0,
+    source: "bound of this program: below 0.01 um is rounding, above 1 mm there is no retina",
+};
+
+/// What may be asked of the time.
+pub const MAX_TIME: ParameterRange = ParameterRange {
+    name: "longest time",
+    unit: "ms",
+    default: 15.0,
+    min: 0.01,
+    max: 600_000.0,
+    source: "bound of this program: from a fraction of what the fastest level takes to ten minutes",
+};
 
 /// The gauge of a request that gives neither gauge nor radius.
 pub const DEFAULT_GAUGE: &str = "25G";
@@ -41,7 +61,8 @@ pub const FORCE: ParameterRange = ParameterRange {
 /// How far the length of a quaternion may be from 1; it is then made 1.
 const QUATERNION_TOLERANCE: f64 = 1e-3;
 
-/// The core's request; the scene is looked up apart, see [`crate::scenes`].
+/// The core's request, its level that of one that asks for none; the scene is looked up apart, see [`crate::scenes`], and so is what the answer must
+/// keep, see [`budget`].
 ///
 /// # Errors
 /// A problem that names the field.
@@ -49,24 +70,14 @@ pub fn request(request: &PredictRequest) -> Result<Request, Problem> {
     Ok(Request {
         needle: needle::needle(&request.needle)?,
         control: control(request.control, request.force_mn)?,
-        level: level(request.accuracy.as_ref())?,
+        level: DEFAULT_LEVEL,
         effects: effects(request.effects.as_ref())?,
     })
 }
 
 fn control(control: ControlName, force_mn: Option<Vector>) -> Result<Control, Problem> {
     match (control, force_mn) {
-        (ControlName::Force, Some(Vector(force_mn))) => {
-            let force = Vector3::from(force_mn);
-            FORCE.check("force_mn", force.norm()).map_err(|error| {
-                let mut problem = from_out_of_range("force_mn".to_owned(), &error);
-                // The caller wrote a vector, so that is what is shown; its length may not even be finite.
-                problem.errors[0].value = Some(json!(force_mn));
-                problem.errors[0].allowed = format!("length {}", problem.errors[0].allowed);
-                problem
-            })?;
-            Ok(Control::Force(force))
-        }
+        (ControlName::Force, Some(force_mn)) => force("force_mn", force_mn).map(Control::Force),
         (ControlName::Force, None) => Err(Problem::field(
             Kind::InvalidRequest,
             "force_mn",
@@ -85,19 +96,42 @@ fn control(control: ControlName, force_mn: Option<Vector>) -> Result<Control, Pr
     }
 }
 
-fn level(accuracy: Option<&AccuracySpec>) -> Result<Level, Problem> {
+/// The force at `field`, not longer than [`FORCE`] allows.
+fn force(field: &str, Vector(force_mn): Vector) -> Result<Vector3<f64>, Problem> {
+    let force = Vector3::from(force_mn);
+    FORCE.check(field, force.norm()).map_err(|error| {
+        let mut problem = from_out_of_range(field.to_owned(), &error);
+        // The caller wrote a vector, so that is what is shown; its length may not even be finite.
+        problem.errors[0].value = Some(json!(force_mn));
+        problem.errors[0].allowed = format!("length {}", problem.errors[0].allowed);
+        problem
+    })?;
+    Ok(force)
+}
+
+/// What the answer must keep.
+///
+/// # Errors
+/// A problem that names the field.
+pub fn budget(accuracy: Option<&AccuracySpec>) -> Result<Budget, Problem> {
     let Some(accuracy) = accuracy else {
-        return Ok(DEFAULT_LEVEL);
+        return Ok(Budget::default());
     };
-    let promises = [("accuracy.max_error_um", &accuracy.max_error_um), ("accuracy.max_time_ms", &accuracy.max_time_ms)];
-    if let Some((field, _)) = promises.into_iter().find(|(_, given)| given.is_some()) {
-        let detail = format!("{field} is not supported by this version: choose a level with accuracy.level");
-        let allowed = "left out; use accuracy.level";
-        return Err(Problem::field(Kind::NotSupported, field, None, allowed, detail));
-    }
-    let Some(name) = &accuracy.level else {
-        return Ok(DEFAULT_LEVEL);
+    let promise = |field: &str, range: &ParameterRange, value: Option<f64>| match value {
+        Some(value) => {
+            range.check(field, value).map_err(|error| from_out_of_range(field.to_owned(), &error)).map(|()| Some(value))
+        }
+        None => Ok(None),
     };
+    Ok(Budget {
+        max_error_um: promise("accuracy.max_error_um", &MAX_ERROR, accuracy.max_error_um)?,
+        max_time_ms: promise("accuracy.max_time_ms", &MAX_TIME, accuracy.max_time_ms)?,
+        level: accuracy.level.as_deref().map(level).transpose()?,
+        strict: accuracy.strict,
+    })
+}
+
+fn level(name: &str) -> Result<Level, Problem> {
     let names: Vec<&str> = Level::ALL.map(Level::name).to_vec();
     Level::ALL
         .into_iter()

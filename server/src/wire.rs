@@ -12,9 +12,11 @@ pub mod object;
 pub mod request;
 pub mod response;
 pub mod scene;
+pub mod sequence;
 
 pub use catalog::{GaugeList, LevelList, Readiness, SceneList};
 pub use fixed::{Quaternion, Triangle, Vector};
 pub use request::PredictRequest;
 pub use response::PredictResponse;
 pub use scene::SceneSpec;
+pub use sequence::{SimulateLine, SimulateRequest};

@@ -10,6 +10,7 @@ mod equilibrium;
 mod frames;
 mod refusals;
 mod repeatability;
+mod sequences;
 mod shape;
 mod support;
 mod zeros;

@@ -8,7 +8,7 @@ use retina_core::predict::{Control, EffectChoice, Level, PredictError, Predictio
 use retina_core::progress::Silent;
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::TriangleMesh;
-use retina_tests::working_range::WorkingRange;
+use retina_core::working_range::WorkingRange;
 
 /// The levels that are fast enough for every law.
 pub const FAST: [Level; 2] = [Level::Linear, Level::Coarse];

@@ -13,7 +13,9 @@ use retina_core::effects::EFFECT_NAMES;
 use retina_core::effects::contact::{Contact, ContactFaces};
 use retina_core::effects::elasticity::Elasticity;
 use retina_core::effects::finite_strain::{FiniteStrain, Lame, NeoHookean};
+use retina_core::effects::inertia::{Inertia, VitreousDrag};
 use retina_core::effects::solid::SolidGeometry;
+use retina_core::effects::viscoelasticity::{Network, Networks};
 use retina_core::mesh::element::{FACE_NODES, NODE_OFFSETS, NODES, TOP_NODES};
 use retina_core::needle::{Body, NeedleShape};
 use retina_tests::tolerance::{DERIVATIVE, EXACT, ROUNDOFF};
@@ -37,13 +39,15 @@ const SIZES: [f64; 3] = [1.0, 1e-3, 1e3];
 const REPEATS: usize = 4;
 
 /// The rows of the derivative check: each runs [`check_effect`] on its effect.
-const ROWS: [(&str, fn()); 6] = [
+const ROWS: [(&str, fn()); 8] = [
     ("elasticity", check_elasticity),
     ("finite_strain", check_finite_strain),
     ("contact", check_contact),
     ("friction", friction::check),
     ("pressure", pressure::check),
     ("adhesion", adhesion::check),
+    ("viscoelasticity", check_viscoelasticity),
+    ("inertia", check_inertia),
 ];
 
 fn largest(values: &[f64]) -> f64 {
@@ -241,6 +245,56 @@ fn check_finite_strain() {
             for case in &cases {
                 assert!(check_prediction(&effect, case), "the Hessian does not see the stresses: {}", case.label);
             }
+        }
+    }
+}
+
+/// Steps of the rows of effects with memory (s), and the relaxation times around them.
+const MEMORY_STEPS_S: [f64; 3] = [1e-6, 0.05, 1e3];
+
+fn check_viscoelasticity() {
+    let network = |relaxation_time_s, modulus_ratio| Network { relaxation_time_s, modulus_ratio };
+    for size in SIZES {
+        let solids = solids(size);
+        let mut networks = Networks::at_rest(vec![7.0, 3.0], vec![network(0.02, 2.0), network(5.0, 0.7)]);
+        let cases = solids.random_cases();
+        for (round, step_s) in MEMORY_STEPS_S.into_iter().enumerate() {
+            check_effect("viscoelasticity", &networks.step(&solids.geometry, step_s), &cases);
+            // What is remembered from now on is a deformed state, not rest.
+            let mut positions = solids.rest.clone();
+            let mut random = noise(70 + round as u64);
+            for coordinate in &mut positions {
+                *coordinate *= 1.1;
+                *coordinate += 0.02 * size * EDGES[2] * random();
+            }
+            networks.commit(&solids.geometry, &solids.stencils, &positions, 0.01);
+        }
+    }
+}
+
+fn check_inertia() {
+    for size in SIZES {
+        let solids = solids(size);
+        let coasting: Vec<f64> = solids.rest.iter().map(|x| 1.2 * x + 0.01 * size).collect();
+        let (stencils, rest) = face(size);
+        let faces = ContactFaces::new(&stencils, &rest, 3);
+        for step_s in MEMORY_STEPS_S {
+            let density_kg_per_mm3 = &[1e-6, 1.2e-6];
+            let inertia = Inertia {
+                geometry: &solids.geometry,
+                stencils: &solids.stencils,
+                density_kg_per_mm3,
+                coasting: &coasting,
+                step_s,
+            };
+            check_effect("inertia", &inertia, &solids.random_cases());
+            let drag =
+                VitreousDrag { faces: &faces, stencils: &stencils, start: &rest, drag_kpa_s_per_mm: 2.7e-3, step_s };
+            let mut random = noise(9);
+            let current = vec![0.0; rest.len()];
+            let current: Vec<f64> = current.iter().map(|_| size * RADIUS * random()).collect();
+            let case = Case { label: format!("drag, size {size:e}"), group: 0, current, step_mm: STEP * RADIUS * size };
+            check_effect("inertia", &drag, &[case]);
         }
     }
 }

@@ -5,11 +5,15 @@
 //! Not here: whether the physics is right, which the other tiers say.
 
 mod answers;
+mod budgets;
 mod catalog;
 mod harness;
 mod load;
+mod page;
 mod program;
 mod properties;
+mod recording;
 mod refusals;
 mod schema;
+mod sequences;
 mod sockets;

@@ -1,4 +1,5 @@
-//! What HTTP costs on top of a prediction: `cargo run --release -p retina-tests --example http_overhead [linear|coarse|reference] [count]`.
+//! What HTTP costs on top of a prediction: `cargo run --release -p retina-tests --example http_overhead [linear|coarse|reference] [count]
+//! [--record FILE.rrd]`. Whatever follows the count is the service's command line; to record needs `--features rerun`.
 //!
 //! One kept connection on loopback, one request after the other, the service in this process with one numerical thread. The overhead of
 //! a request is its round trip as the client sees it less the time that the answer says the core took (all stages but `queue`, `read`
@@ -7,11 +8,11 @@
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::mpsc::Sender;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::Parser as _;
 use retina_server::config::CommandLine;
-use retina_server::{App, run};
+use retina_server::{App, AppState, recording, run};
 use serde_json::{Value, json};
 use tokio_util::sync::CancellationToken;
 
@@ -22,8 +23,12 @@ fn main() {
     let mut arguments = std::env::args().skip(1);
     let level = arguments.next().unwrap_or("linear".to_owned());
     let count: usize = arguments.next().map_or(2000, |count| count.parse().expect("count"));
+    let words = ["retina-server", "--threads", "1"].map(str::to_owned).into_iter().chain(arguments);
+    let config = CommandLine::parse_from(words).config;
+    let recorder = config.recording().map(|destination| recording::start(&destination).expect("a recording"));
     let (sender, receiver) = std::sync::mpsc::channel();
-    std::thread::spawn(move || serve(&sender));
+    let service = App::start_recorded(&config, recorder.clone()).expect("threads");
+    std::thread::spawn(move || serve(&sender, service));
     let address = receiver.recv().expect("address");
 
     let stream = TcpStream::connect(address).expect("connection");
@@ -57,17 +62,18 @@ fn main() {
     println!("overhead:   {}", summary(&mut overheads));
     println!("  of it queue: {}", summary(&mut queues));
     println!("  of it read:  {}", summary(&mut reads));
+    if let Some(recorder) = recorder {
+        println!("recording:  {:?}", recorder.finish(Duration::from_secs(60)));
+    }
 }
 
 /// The service as the program runs it: one thread that talks, one that computes.
-fn serve(bound: &Sender<SocketAddr>) {
+fn serve(bound: &Sender<SocketAddr>, service: AppState) {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("runtime");
     runtime.block_on(async {
         let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.expect("port");
         bound.send(listener.local_addr().expect("address")).expect("main thread");
-        let config = CommandLine::parse_from(["retina-server", "--threads", "1"]).config;
-        let state = App::start(&config).expect("threads");
-        run(listener, state, CancellationToken::new()).await.expect("service");
+        run(listener, service, CancellationToken::new()).await.expect("service");
     });
 }
 

@@ -146,10 +146,14 @@ fn fields_that_are_unknown_missing_or_of_another_type() {
 }
 
 #[test]
-fn promises_that_this_version_cannot_keep() {
+fn promises_that_no_level_keeps() {
+    let asking = |accuracy| with(request("linear"), "/accuracy", accuracy);
+    let reply = predict(&asking(json!({"max_error_um": 0.01, "max_time_ms": 0.01, "strict": true})));
+    assert_field(&reply, 422, "not-possible", "accuracy");
     for key in ["max_error_um", "max_time_ms"] {
-        let reply = predict(&with(request("linear"), &format!("/accuracy/{key}"), json!(2.0)));
-        assert_field(&reply, 422, "not-supported", &format!("accuracy.{key}"));
+        for value in [0.0, -1.0, 1e9] {
+            assert_field(&predict(&asking(json!({key: value}))), 422, "out-of-range", &format!("accuracy.{key}"));
+        }
     }
 }
 

@@ -2,6 +2,4 @@
 
 pub mod held_out;
 pub mod stated_errors;
-pub mod statistics;
 pub mod tolerance;
-pub mod working_range;

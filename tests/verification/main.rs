@@ -2,3 +2,4 @@
 
 mod finite_element;
 mod linear_layer;
+mod rates;

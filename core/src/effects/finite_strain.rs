@@ -14,16 +14,14 @@
 use nalgebra::Matrix3;
 
 use super::solid::{
-    ElementKernel, Energy, Gradient, Hessian, NodeRows, SolidEnergy, SolidGeometry, StiffnessCoefficients, run_kernel,
+    ElementKernel, Energy, Gradient, Hessian, MaxStep, NodeRows, SolidEnergy, SolidGeometry, StiffnessCoefficients,
+    determinant_and_cofactor, push_forward, run_kernel,
 };
 use crate::effect::{Effect, Local};
 use crate::mesh::element::{NODES, POINTS};
 
 /// Name of the effect.
 pub const NAME: &str = "finite_strain";
-
-/// A step may shrink no element's volume at a point below this fraction of what it was.
-const SMALLEST_VOLUME_RATIO: f64 = 0.1;
 
 /// Which neo-Hookean energy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,41 +152,6 @@ impl FiniteStrain<'_> {
         }
         out.copy_from_slice(&self.geometry.project(local.group, &pressure));
     }
-
-    /// The largest t such that no point's J falls below a tenth of its value along `current + t step`.
-    #[inline(always)]
-    fn max_step_n(&self, local: &Local, step: &[f64]) -> f64 {
-        let mut largest = 1.0_f64;
-        for q in 0..POINTS {
-            let f = self.geometry.deformation_gradient(local.group, q, local.current);
-            let df = self.geometry.deformation_gradient(local.group, q, step);
-            let (j, _) = determinant_and_cofactor(&f);
-            while largest > f64::EPSILON && determinant_and_cofactor(&(f + df * largest)).0 <= SMALLEST_VOLUME_RATIO * j
-            {
-                largest *= 0.7;
-            }
-        }
-        largest
-    }
-}
-
-/// Determinant of a 3 × 3 matrix and its cofactor matrix J F⁻ᵀ.
-#[inline(always)]
-fn determinant_and_cofactor(f: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
-    let (c0, c1, c2) = (f.column(0), f.column(1), f.column(2));
-    let cofactor = Matrix3::from_columns(&[c1.cross(&c2), c2.cross(&c0), c0.cross(&c1)]);
-    (c0.dot(&cofactor.column(0)), cofactor)
-}
-
-/// `out` = matrix × gradients, node by node.
-#[inline(always)]
-fn push_forward(matrix: &Matrix3<f64>, gradients: &NodeRows, out: &mut NodeRows) {
-    for i in 0..3 {
-        for a in 0..NODES {
-            out[i][a] =
-                matrix[(i, 0)] * gradients[0][a] + matrix[(i, 1)] * gradients[1][a] + matrix[(i, 2)] * gradients[2][a];
-        }
-    }
 }
 
 struct PredictStress<'a>(&'a FiniteStrain<'a>, &'a Local<'a>, &'a [f64], &'a mut [f64]);
@@ -199,17 +162,6 @@ impl ElementKernel for PredictStress<'_> {
     #[inline(always)]
     fn run(self) {
         self.0.predict_pressure_n(self.1, self.2, self.3)
-    }
-}
-
-struct MaxStep<'a>(&'a FiniteStrain<'a>, &'a Local<'a>, &'a [f64]);
-
-impl ElementKernel for MaxStep<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run(self) -> f64 {
-        self.0.max_step_n(self.1, self.2)
     }
 }
 
@@ -326,6 +278,6 @@ impl Effect for FiniteStrain<'_> {
     }
 
     fn max_step(&self, local: &Local, step: &[f64]) -> f64 {
-        run_kernel(MaxStep(self, local, step))
+        run_kernel(MaxStep(self.geometry, local, step))
     }
 }

@@ -19,6 +19,9 @@ pub type NodeRows = [[f64; NODES]; 3];
 /// Component pairs (row, column) of the lower block triangle of an element matrix.
 const BLOCKS: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
+/// A step may shrink no element's volume at a point below this fraction of what it was.
+const SMALLEST_VOLUME_RATIO: f64 = 0.1;
+
 /// A mesh that cannot carry a solid.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SolidGeometryError {
@@ -114,6 +117,22 @@ impl SolidGeometry {
             }
         }
         f
+    }
+
+    /// The largest t such that no point's J falls below a tenth of its value along `current + t step`.
+    #[inline(always)]
+    pub(super) fn max_step(&self, local: &Local, step: &[f64]) -> f64 {
+        let mut largest = 1.0_f64;
+        for q in 0..POINTS {
+            let f = self.deformation_gradient(local.group, q, local.current);
+            let df = self.deformation_gradient(local.group, q, step);
+            let (j, _) = determinant_and_cofactor(&f);
+            while largest > f64::EPSILON && determinant_and_cofactor(&(f + df * largest)).0 <= SMALLEST_VOLUME_RATIO * j
+            {
+                largest *= 0.7;
+            }
+        }
+        largest
     }
 
     /// Projects point values on the pressure modes and back: the value of the projection at every point.
@@ -264,6 +283,25 @@ fn dot(a: &[f64; NODES], b: &[f64; NODES]) -> f64 {
     (parts[0] + parts[1]) + (parts[2] + parts[3])
 }
 
+/// Determinant of a 3 × 3 matrix and its cofactor matrix J F⁻ᵀ.
+#[inline(always)]
+pub(super) fn determinant_and_cofactor(f: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
+    let (c0, c1, c2) = (f.column(0), f.column(1), f.column(2));
+    let cofactor = Matrix3::from_columns(&[c1.cross(&c2), c2.cross(&c0), c0.cross(&c1)]);
+    (c0.dot(&cofactor.column(0)), cofactor)
+}
+
+/// `out` = matrix × gradients, node by node.
+#[inline(always)]
+pub(super) fn push_forward(matrix: &Matrix3<f64>, gradients: &NodeRows, out: &mut NodeRows) {
+    for i in 0..3 {
+        for a in 0..NODES {
+            out[i][a] =
+                matrix[(i, 0)] * gradients[0][a] + matrix[(i, 1)] * gradients[1][a] + matrix[(i, 2)] * gradients[2][a];
+        }
+    }
+}
+
 /// A computation on one element. A trait and not a closure: a closure that is not inlined loses the vector instructions.
 pub(super) trait ElementKernel {
     /// What it returns.
@@ -327,6 +365,18 @@ impl<S: SolidEnergy> ElementKernel for Hessian<'_, S> {
     #[inline(always)]
     fn run(self) {
         self.0.add_hessian_n(self.1, self.2)
+    }
+}
+
+/// The kernel of [`SolidGeometry::max_step`].
+pub(super) struct MaxStep<'a>(pub &'a SolidGeometry, pub &'a Local<'a>, pub &'a [f64]);
+
+impl ElementKernel for MaxStep<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        self.0.max_step(self.1, self.2)
     }
 }
 

@@ -166,22 +166,19 @@ impl Wall<'_> {
             Some(force_mn) => Drive::Force { direction: load.motion.direction.into_inner(), force_mn },
             None => Drive::Held,
         };
-        let mut failed_iterations = 0;
+        let mut spent = 0;
         let mut failure = NewtonError::Interrupted { iterations: 0 };
         for attempt in [&ATTEMPTS[0], &ATTEMPTS[ATTEMPTS.len() - 1]] {
             let mut positions = found.positions.clone();
             let drive = (drive, tolerance);
-            match self.newton(&self.contact, drive, load, attempt, &mut positions, workspace, progress) {
+            match self.newton(&self.contact, drive, load, attempt, &mut positions, &mut spent, workspace, progress) {
                 Ok(mut report) => {
-                    report.iterations += failed_iterations;
+                    report.iterations = spent;
                     *found = self.equilibrium(load.motion, positions, report, found.load_steps, workspace);
                     return Ok(report);
                 }
                 Err(stop @ NewtonError::Interrupted { .. }) => return Err(stop),
-                Err(error) => {
-                    failed_iterations += error.iterations();
-                    failure = error;
-                }
+                Err(error) => failure = error,
             }
         }
         Err(failure)

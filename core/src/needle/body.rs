@@ -104,6 +104,11 @@ impl Body {
         self.axis_x
     }
 
+    /// Outward normal of the end face, needle-local: straight forwards for half a ball, which has no face.
+    pub fn face_normal(&self) -> Unit<Vector3<f64>> {
+        Unit::new_unchecked(Vector3::new(self.plane_normal.0, 0.0, self.plane_normal.1))
+    }
+
     /// Radius of the shaft (mm).
     pub fn radius_mm(&self) -> f64 {
         self.core_radius + self.edge_radius
@@ -163,6 +168,11 @@ impl Body {
             (b, b_gradient, Matrix3::zeros())
         };
         SignedDistance { value: reach - self.edge_radius, gradient, hessian }
+    }
+
+    /// Whether the tip has no edge: half a ball.
+    pub fn is_round(&self) -> bool {
+        self.core_radius == 0.0 && self.plane_normal.0 == 0.0
     }
 
     /// The point of the needle furthest along a needle-local direction, in needle-local coordinates, mm.

@@ -181,7 +181,7 @@ impl Body {
 
     /// Height at which the ray from `origin` along `up` first meets the needle, mm; `None` when it misses.
     fn height_on_ray(&self, origin: &Point3<f64>, up: &Vector3<f64>, guess: f64) -> Option<f64> {
-        if self.core_radius == 0.0 && self.plane_normal.0 == 0.0 {
+        if self.is_round() {
             let from_centre = origin - Point3::new(0.0, 0.0, self.edge_radius);
             let towards = -from_centre.dot(up);
             let half_chord_squared =

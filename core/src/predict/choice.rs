@@ -6,13 +6,16 @@ pub mod friction;
 pub mod pressure;
 
 use super::types::{EffectChoice, EffectReport, Level, PredictError};
-use crate::effects::{self, EFFECT_NAMES, contact, elasticity, finite_strain};
+use crate::effects::{self, EFFECT_NAMES, contact, elasticity, finite_strain, inertia, viscoelasticity};
 use crate::equilibrium::Solid;
 use adhesion::Pull;
 use friction::Sliding;
 
 /// Error that `auto` accepts for leaving an effect out (µm): a tenth of the best published tool-to-layer error (9 µm).
 pub const AUTO_TOLERANCE_UM: f64 = 1.0;
+
+/// Why one prediction leaves out what depends on rate: its load lasts.
+const STATIC: &str = "static scene: not called for";
 
 /// The decision.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,6 +109,8 @@ pub fn decide(
         friction::report(choice, level, contact, &expected.sliding),
         pressure.clone(),
         adhesion::report(choice, level, contact, &expected.pull),
+        plain(viscoelasticity::NAME, false, STATIC),
+        plain(inertia::NAME, false, STATIC),
     ];
     let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
     let is_on = |name: &str| reports.iter().any(|report| report.name == name && report.simulated);

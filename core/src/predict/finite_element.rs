@@ -13,7 +13,7 @@ use crate::equilibrium::{
 };
 use crate::mesh::disc::DiscGeometry;
 use crate::mesh::sample::locate;
-use crate::mesh::wall::{Place, WallDivision, WallTopology};
+use crate::mesh::wall::{Place, WallDivision, WallError, WallTopology};
 use crate::patch::Patch;
 use crate::progress::Progress;
 use crate::solve::newton::Workspace;
@@ -157,7 +157,7 @@ pub struct Problem<'a> {
 
 impl Problem<'_> {
     /// The mesh around the estimated contact.
-    fn mesh(&self, resolution: &Resolution, estimate: &ContactEstimate) -> MeshSize {
+    pub(crate) fn mesh(&self, resolution: &Resolution, estimate: &ContactEstimate) -> MeshSize {
         let needle_radius = self.tool.body.radius_mm();
         let contact = estimate.radius_mm.max(SMALLEST_CONTACT * needle_radius);
         let core = resolution.core_per_contact * contact;
@@ -184,27 +184,8 @@ impl Problem<'_> {
     ) -> Result<FiniteElementAnswer, PredictError> {
         progress.stage("mesh");
         let Bench { level, resolution, topology, workspace } = bench;
-        let mesh = self.mesh(resolution, estimate);
-        let mut wall =
-            Wall::new(topology, &self.patch.surface, self.tissue, &mesh, self.solid, resolution.contact, self.tool)?;
-        let settled = self.pressure_kpa.map(|pressure_kpa| {
-            let yields = |kind| kind != LayerKind::Sclera || resolution.sclera_elements > 0;
-            Settled::new(self.tissue, pressure_kpa, self.solid, yields)
-        });
-        if let (Some(settled), Some(pressure_kpa)) = (&settled, self.pressure_kpa) {
-            wall.settle(&self.patch.surface, settled, pressure_kpa);
-        }
-        let touch_mm = wall.touch(&self.motion.direction, estimate.touch_mm).unwrap_or(estimate.touch_mm);
-        let motion = match self.motion.force_mn {
-            Some(force_mn) => {
-                let beyond = (estimate.travel_mm - estimate.touch_mm).max(0.0);
-                let area = std::f64::consts::PI
-                    * estimate.radius_mm.max(SMALLEST_CONTACT * self.tool.body.radius_mm()).powi(2);
-                let overlap = force_mn / area / resolution.contact.softened().stiffness_kpa_per_mm;
-                Motion { travel_mm: touch_mm + beyond + overlap, ..self.motion }
-            }
-            None => self.motion,
-        };
+        let wall = self.wall(topology, resolution, &self.mesh(resolution, estimate))?;
+        let (motion, touch_mm) = self.aimed(&wall, resolution, estimate);
         let mut positions = wall.displaced(start);
         wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm));
         progress.stage("equilibrium");
@@ -239,8 +220,7 @@ impl Problem<'_> {
             }
         };
         progress.stage("surface");
-        let beyond = |parameter| settled.as_ref().map_or_else(Vector3::zeros, |settled| self.sunk(settled, parameter));
-        let mut answer = self.answer(&wall, &equilibrium, touch_mm, &beyond);
+        let mut answer = self.answer(&wall, resolution, &equilibrium, touch_mm);
         if let Some(rubbing) = rubbing.filter(|_| answer.contact.state == ContactState::Touching) {
             answer.contact.slipping_share = Some(rubbing.slipping_share);
             if rubbing.slipping_share > SLIPPING_FROM {
@@ -251,19 +231,77 @@ impl Problem<'_> {
         Ok(answer)
     }
 
+    /// The contact's parameters: a round tip meets the tissue all at once and needs no softened approach.
+    fn contact(&self, resolution: &Resolution) -> ContactSettings {
+        match self.tool.body.is_round() {
+            true => ContactSettings { softening: 1.0, ..resolution.contact },
+            false => resolution.contact,
+        }
+    }
+
+    /// The meshed wall under the needle.
+    ///
+    /// # Errors
+    /// If the wall cannot be meshed there.
+    pub(crate) fn wall<'b>(
+        &'b self,
+        topology: &'b WallTopology,
+        resolution: &Resolution,
+        mesh: &MeshSize,
+    ) -> Result<Wall<'b>, WallError> {
+        let mut wall = Wall::new(
+            topology,
+            &self.patch.surface,
+            self.tissue,
+            mesh,
+            self.solid,
+            self.contact(resolution),
+            self.tool,
+        )?;
+        if let (Some(settled), Some(pressure_kpa)) = (self.settled(resolution), self.pressure_kpa) {
+            wall.settle(&self.patch.surface, &settled, pressure_kpa);
+        }
+        Ok(wall)
+    }
+
+    /// Where the wall stands far from the needle, if the eye's pressure has changed.
+    fn settled(&self, resolution: &Resolution) -> Option<Settled> {
+        let yields = |kind| kind != LayerKind::Sclera || resolution.sclera_elements > 0;
+        self.pressure_kpa.map(|pressure_kpa| Settled::new(self.tissue, pressure_kpa, self.solid, yields))
+    }
+
+    /// The motion with a guess of its travel on this wall, and the travel at first touch (mm).
+    pub(crate) fn aimed(&self, wall: &Wall, resolution: &Resolution, estimate: &ContactEstimate) -> (Motion, f64) {
+        let touch_mm = wall.touch(&self.motion.direction, estimate.touch_mm).unwrap_or(estimate.touch_mm);
+        let motion = match self.motion.force_mn {
+            Some(force_mn) => {
+                let beyond = (estimate.travel_mm - estimate.touch_mm).max(0.0);
+                let area = std::f64::consts::PI
+                    * estimate.radius_mm.max(SMALLEST_CONTACT * self.tool.body.radius_mm()).powi(2);
+                let overlap = force_mn / area / self.contact(resolution).softened().stiffness_kpa_per_mm;
+                Motion { travel_mm: touch_mm + beyond + overlap, ..self.motion }
+            }
+            None => self.motion,
+        };
+        (motion, touch_mm)
+    }
+
     /// Displacement of a surface point far from the needle (mm).
     fn sunk(&self, settled: &Settled, [x, y]: [f64; 2]) -> Vector3<f64> {
         let column = self.patch.surface.column(x, y);
         column.inward.into_inner() * settled.sink_mm(&column, 0.0)
     }
 
-    fn answer(
+    /// The equilibrium read off at the patch's nodes.
+    pub(crate) fn answer(
         &self,
         wall: &Wall,
+        resolution: &Resolution,
         equilibrium: &Equilibrium,
         touch_mm: f64,
-        beyond: &dyn Fn([f64; 2]) -> Vector3<f64>,
     ) -> FiniteElementAnswer {
+        let settled = self.settled(resolution);
+        let beyond = |parameter| settled.as_ref().map_or_else(Vector3::zeros, |settled| self.sunk(settled, parameter));
         let displacement: Vec<f64> =
             equilibrium.positions.iter().zip(&wall.geometry.rest).map(|(current, rest)| current - rest).collect();
         let node = |&parameter: &[f64; 2]| match locate(wall.topology(), &wall.geometry, parameter) {

@@ -29,6 +29,13 @@ pub struct Press {
     pub load: Load,
 }
 
+impl Press {
+    /// Tangent of the angle between the motion and the inward normal.
+    pub fn tangent(&self) -> f64 {
+        (1.0 - self.cosine * self.cosine).max(0.0).sqrt() / self.cosine
+    }
+}
+
 /// What is given along the normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Load {

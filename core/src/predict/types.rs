@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use thiserror::Error;
 
+use super::expected_error::ExpectedError;
 use crate::equilibrium::friction::FrictionError;
 use crate::mesh::wall::WallError;
 use crate::needle::Needle;
@@ -157,6 +158,8 @@ pub struct Prediction {
     pub contact: ContactReport,
     /// Which level answered.
     pub level: Level,
+    /// How far the answer is likely to be from the truth.
+    pub expected_error: ExpectedError,
     /// Every effect, simulated or not.
     pub effects: Vec<EffectReport>,
     /// What it cost.
@@ -168,6 +171,12 @@ pub struct Prediction {
 /// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum PredictError {
+    /// No level keeps a strict budget.
+    #[error("the accuracy asked for cannot be kept: {problem}")]
+    Budget {
+        /// What would be broken, and by how much.
+        problem: String,
+    },
     /// A number outside its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),

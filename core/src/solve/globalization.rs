@@ -1,7 +1,7 @@
 //! How Newton steps are used: what makes the Hessian positive definite, and how much of a step is taken.
 //!
 //! - [`Globalization::PredictedStress`]: full steps; the Hessian's stress-dependent part uses the stresses that the last linear step
-//!   predicted ([`crate::effect::Effect::predict_stress`]), and none while the residual is far from zero: stresses mean little there, and
+//!   predicted ([`crate::effect::Effect::predict_stress`]), and none in first steps far from equilibrium: stresses mean little there, and
 //!   without them the Hessian is positive definite. The first steps may raise the potential Π on their way to a better
 //!   place, later ones that do (a sharp edge changing sides) are halved. Where the tissue is about to buckle and the Hessian is not positive
 //!   definite, the stresses are halved and then left out, which keeps the tissue's own scale in every direction (a raised diagonal has
@@ -55,8 +55,11 @@ const SHIFT_GROWTH: f64 = 10.0;
 const FIRST_SHIFT: f64 = 1e-4;
 /// Shifts tried before giving up.
 const MAX_SHIFTS: usize = 8;
-/// Residual over force scale above which predicted stresses are not yet used.
+/// Residual over force scale above which predicted stresses are not used in the first steps.
 const STRESS_STIFFNESS_BELOW: f64 = 0.1;
+/// How many first steps these are; what is still far after them is on its way through large rotations, and short steps without stresses lead
+/// nowhere.
+const STRESSLESS_STEPS: usize = 6;
 /// Shares of the predicted stresses with which a positive definite Hessian is sought.
 const STRESS_SHARES: [f64; 3] = [1.0, 0.5, 0.0];
 /// Steps of `PredictedStress` that may raise Π.
@@ -212,7 +215,8 @@ impl System<'_> {
                     residual_mn = self.residual(positions, trial.drive, workspace);
                 }
             }
-            if residual_mn > STRESS_STIFFNESS_BELOW * trial.force_scale_mn {
+            let far = residual_mn > STRESS_STIFFNESS_BELOW * trial.force_scale_mn;
+            if far && step.number <= STRESSLESS_STEPS {
                 trial.predicted.clear();
                 return Some((halvings, residual_mn));
             }

@@ -46,8 +46,9 @@ kinds! {
          their sources. Values are refused, never moved.";
     UnknownName = "unknown-name", UNPROCESSABLE_ENTITY, "There is nothing of that name",
         "A scene, gauge, level or effect that does not exist, or that the level cannot do. `errors` lists the known ones.";
-    NotSupported = "not-supported", UNPROCESSABLE_ENTITY, "Not supported by this version",
-        "The field is planned and has no effect yet, so it is refused instead of ignored.";
+    NotPossible = "not-possible", UNPROCESSABLE_ENTITY, "No level keeps what is promised",
+        "`accuracy.strict` was asked for, and no level is expected to keep the error or the time. `detail` says by how much. Ask for less, or \
+         without `strict` for the best there is.";
     PointsAway = "points-away", UNPROCESSABLE_ENTITY, "The needle or the force points away from the tissue",
         "Needle and force must point into the tissue: +z of the patch frame is the vitreous, so a needle pushes towards -z. `errors` \
          says by how much the direction is off.";

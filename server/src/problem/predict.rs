@@ -73,6 +73,9 @@ pub fn from_predict(error: PredictError) -> Problem {
             format!("at most {limit_mm} mm below the surface at rest"),
             detail,
         ),
+        PredictError::Budget { problem } => {
+            Problem::field(Kind::NotPossible, "accuracy", None, "promises that a level keeps, or not strict", problem)
+        }
         PredictError::Effect { name, .. } => Problem::field(
             Kind::UnknownName,
             "effects",

@@ -1,13 +1,13 @@
 //! The needle of a request.
 
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use retina_core::needle::shape::{BEVEL_ANGLE, EDGE_FRACTION_OF_RADIUS};
-use retina_core::needle::{Gauge, Needle, NeedleShape, Tip};
+use retina_core::needle::{Gauge, Needle, NeedleShape, Tip, orientation_pointing};
 use serde_json::json;
 
 use super::{DEFAULT_GAUGE, rotation, unknown_name};
 use crate::problem::{Kind, Problem, from_out_of_range};
-use crate::wire::fixed::Vector;
+use crate::wire::fixed::{Quaternion, Vector};
 use crate::wire::request::{BevelledTip, FlatTip, NeedleSpec, TipName, TipShape, TipSpec};
 
 /// A direction must be at least this long; shorter ones are rounding.
@@ -18,14 +18,26 @@ pub(super) fn needle(spec: &NeedleSpec) -> Result<Needle, Problem> {
     let radius_mm = radius_mm(spec)?;
     let shape = NeedleShape { radius_mm, tip: tip(spec.tip.as_ref(), radius_mm)? };
     let tip_mm = Point3::from(spec.tip_mm.0);
-    let needle = match (&spec.orientation_xyzw, &spec.direction) {
-        (Some(_), Some(_)) => return Err(both("needle.direction", "needle.orientation_xyzw")),
-        (Some(xyzw), None) => Needle { shape, tip_mm, orientation: rotation("needle.orientation_xyzw", xyzw.0)? },
-        (None, Some(direction)) => Needle::pointing(shape, tip_mm, &unit(direction)?),
-        (None, None) => Needle::pointing(shape, tip_mm, &-Vector3::z_axis()),
-    };
+    let orientation = orientation("needle", spec.orientation_xyzw.as_ref(), spec.direction.as_ref())?
+        .unwrap_or_else(|| orientation_pointing(&-Vector3::z_axis()));
+    let needle = Needle { shape, tip_mm, orientation };
     needle.validate().map_err(|error| from_out_of_range(tip_field(&error.field, &shape), &error))?;
     Ok(needle)
+}
+
+/// The orientation that `orientation_xyzw` or `direction` of the object at `path` gives, if either does.
+pub(super) fn orientation(
+    path: &str,
+    xyzw: Option<&Quaternion>,
+    direction: Option<&Vector>,
+) -> Result<Option<UnitQuaternion<f64>>, Problem> {
+    let (xyzw_path, direction_path) = (format!("{path}.orientation_xyzw"), format!("{path}.direction"));
+    match (xyzw, direction) {
+        (Some(_), Some(_)) => Err(both(&direction_path, &xyzw_path)),
+        (Some(xyzw), None) => rotation(&xyzw_path, xyzw.0).map(Some),
+        (None, Some(direction)) => Ok(Some(orientation_pointing(&unit(&direction_path, direction)?))),
+        (None, None) => Ok(None),
+    }
 }
 
 fn radius_mm(spec: &NeedleSpec) -> Result<f64, Problem> {
@@ -41,7 +53,7 @@ fn radius_mm(spec: &NeedleSpec) -> Result<f64, Problem> {
 }
 
 /// Scaled before it is squared, so that neither 1e-9 nor 1e300 is lost.
-fn unit(direction: &Vector) -> Result<Unit<Vector3<f64>>, Problem> {
+fn unit(field: &str, direction: &Vector) -> Result<Unit<Vector3<f64>>, Problem> {
     let vector = Vector3::from(direction.0);
     let largest = vector.amax();
     if largest > 0.0 {
@@ -52,10 +64,10 @@ fn unit(direction: &Vector) -> Result<Unit<Vector3<f64>>, Problem> {
     }
     Err(Problem::field(
         Kind::OutOfRange,
-        "needle.direction",
+        field,
         Some(json!(direction.0)),
         format!("a vector of length {SHORTEST_DIRECTION:e} or more"),
-        "needle.direction is too short to point anywhere",
+        format!("{field} is too short to point anywhere"),
     ))
 }
 

@@ -8,13 +8,16 @@ use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::mesh_file::{MeshFormat, read_mesh};
 use retina_core::surface::{EYE_RADIUS, MeshError, PIT_DEPTH, PIT_SIGMA, TriangleMesh};
 use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA};
+use retina_core::tissue::rate::{PronyTerm, RateProperties};
 use retina_core::tissue::{Layer, RetinalBond, Tissue};
 
 use super::{DEFAULT_SCENE, rotation, unknown_name};
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::{Triangle, Vector};
 use crate::wire::request::SceneChoice;
-use crate::wire::scene::{BondSpec, LayerSpec, PoseSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec};
+use crate::wire::scene::{
+    BondSpec, LayerSpec, PoseSpec, PronyTermSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec,
+};
 
 /// Name of every scene that is written out.
 const INLINE_NAME: &str = "inline";
@@ -170,6 +173,7 @@ fn tissue(spec: &TissueSpec) -> Tissue {
         choroid: or_default(&spec.choroid, &CHOROID),
         sclera: or_default(&spec.sclera, &SCLERA),
         bond: bond(&spec.bond.unwrap_or_default()),
+        rate: spec.rate.as_ref().map_or_else(RateProperties::default, rate),
     }
 }
 
@@ -178,6 +182,19 @@ fn bond(spec: &BondSpec) -> RetinalBond {
     RetinalBond {
         strength_kpa: spec.strength_kpa.unwrap_or(default.strength_kpa),
         fracture_energy_mn_per_mm: spec.fracture_energy_mn_per_mm.unwrap_or(default.fracture_energy_mn_per_mm),
+    }
+}
+
+fn rate(spec: &RateSpec) -> RateProperties {
+    let default = RateProperties::default();
+    let term = |term: &PronyTermSpec| PronyTerm { relaxation_time_s: term.relaxation_time_s, share: term.share };
+    RateProperties {
+        retina_relaxation: match &spec.retina_relaxation {
+            Some(terms) => terms.iter().map(term).collect(),
+            None => default.retina_relaxation,
+        },
+        density_kg_per_mm3: spec.density_kg_per_mm3.unwrap_or(default.density_kg_per_mm3),
+        vitreous_drag_kpa_s_per_mm: spec.vitreous_drag_kpa_s_per_mm.unwrap_or(default.vitreous_drag_kpa_s_per_mm),
     }
 }
 

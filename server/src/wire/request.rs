@@ -3,7 +3,6 @@
 //! Contract: only `needle` and, under force control, `force_mn` are required. Names (scene, gauge, level, effects) are read as text
 //! here and looked up in `understand`, so that an unknown one is answered with the list of known ones.
 
-use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -125,15 +124,20 @@ pub struct BevelledTip {
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AccuracySpec {
-    /// The level that answers, see `GET /v1/levels`; `coarse` when left out.
+    /// The level that answers, see `GET /v1/levels`; `coarse` when neither this nor a promise is given.
     #[schema(example = "coarse")]
     pub level: Option<String>,
-    /// Refused by this version: choosing a level by its error needs a calibration that does not exist yet.
-    #[schema(ignore)]
-    pub max_error_um: Option<IgnoredAny>,
-    /// Refused by this version, like `max_error_um`.
-    #[schema(ignore)]
-    pub max_time_ms: Option<IgnoredAny>,
+    /// Largest error of the worst node of the patch that is accepted, kept in 95 of 100 requests, µm: the cheapest level that keeps it
+    /// answers.
+    #[schema(example = 5.0)]
+    pub max_error_um: Option<f64>,
+    /// Longest time from the arrival of the request to its answer that is accepted, ms: with `max_error_um` it bounds the choice,
+    /// alone it asks for the most accurate level in time.
+    #[schema(example = 20.0)]
+    pub max_time_ms: Option<f64>,
+    /// Whether a promise that no level is expected to keep is refused; otherwise the best there is answers, with a warning.
+    #[serde(default)]
+    pub strict: bool,
 }
 
 /// A built-in scene by name, or a scene written out.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::{Point3, Vector3};
-use retina_core::predict::{ContactState, EffectReport, Prediction, SolverReport};
+use retina_core::predict::{ContactReport, ContactState, EffectReport, NeedleOutcome, Prediction, SolverReport};
 use serde::ser::{SerializeMap, SerializeSeq};
 use serde::{Serialize, Serializer};
 use utoipa::ToSchema;
@@ -103,6 +103,21 @@ pub enum ContactWord {
 pub struct AccuracyAnswer {
     /// The level that answered.
     pub level: &'static str,
+    /// How far the worst node of the patch is likely to be from the truth.
+    pub expected_error_um: ExpectedErrorAnswer,
+    /// Whether that was measured on requests like this one (tissue, needle, pose).
+    pub calibrated: bool,
+}
+
+/// The error of the worst node of the patch, over requests like this one, µm; left out where too few were measured to say.
+#[derive(Serialize, ToSchema)]
+pub struct ExpectedErrorAnswer {
+    /// Half of them err less.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub median: Option<f64>,
+    /// 95 of 100 err less.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p95: Option<f64>,
 }
 
 /// One effect: simulated or not, and why.
@@ -159,30 +174,61 @@ impl<'a> PredictResponse<'a> {
                 displacement_um: &prediction.displacement_um,
                 source_indices: prediction.source_indices.as_deref(),
             },
-            needle: NeedleAnswer {
-                tip_mm: Vector(needle.tip_mm.coords.into()),
-                travel_mm: needle.travel_mm,
-                reaction_mn: Vector(needle.reaction_mn.into()),
-            },
-            contact: ContactAnswer {
-                state: match contact.state {
-                    ContactState::Clear => ContactWord::Clear,
-                    ContactState::Touching => ContactWord::Touching,
-                    ContactState::Slipping => ContactWord::Slipping,
-                },
-                area_mm2: contact.area_mm2,
-                max_strain: contact.max_strain,
-                max_pressure_kpa: contact.max_pressure_kpa,
-                max_penetration_um: contact.max_penetration_mm * 1e3,
-                slipping_share: contact.slipping_share,
-                bond_damage: contact.bond_damage,
-            },
-            accuracy: AccuracyAnswer { level: prediction.level.name() },
+            needle: NeedleAnswer::from(needle),
+            contact: ContactAnswer::from(contact),
+            accuracy: AccuracyAnswer::from(prediction),
             effects: prediction.effects.iter().map(EffectAnswer::from).collect(),
             solver: SolverAnswer::from(&prediction.solver),
-            time_us: TimeAnswer { total: micros(stages.iter().map(|(_, time)| *time).sum()), stages },
+            time_us: TimeAnswer::new(stages),
             warnings: &prediction.warnings,
         }
+    }
+}
+
+impl From<&Prediction> for AccuracyAnswer {
+    fn from(prediction: &Prediction) -> Self {
+        let expected = &prediction.expected_error;
+        let known = |um: f64| Some(um).filter(|um| um.is_finite() && expected.p95_um.is_finite());
+        Self {
+            level: prediction.level.name(),
+            expected_error_um: ExpectedErrorAnswer { median: known(expected.median_um), p95: known(expected.p95_um) },
+            calibrated: expected.calibrated,
+        }
+    }
+}
+
+impl From<&NeedleOutcome> for NeedleAnswer {
+    fn from(needle: &NeedleOutcome) -> Self {
+        Self {
+            tip_mm: Vector(needle.tip_mm.coords.into()),
+            travel_mm: needle.travel_mm,
+            reaction_mn: Vector(needle.reaction_mn.into()),
+        }
+    }
+}
+
+impl From<&ContactReport> for ContactAnswer {
+    fn from(contact: &ContactReport) -> Self {
+        Self {
+            state: match contact.state {
+                ContactState::Clear => ContactWord::Clear,
+                ContactState::Touching => ContactWord::Touching,
+                ContactState::Slipping => ContactWord::Slipping,
+            },
+            area_mm2: contact.area_mm2,
+            max_strain: contact.max_strain,
+            max_pressure_kpa: contact.max_pressure_kpa,
+            max_penetration_um: contact.max_penetration_mm * 1e3,
+            slipping_share: contact.slipping_share,
+            bond_damage: contact.bond_damage,
+        }
+    }
+}
+
+impl<'a> TimeAnswer<'a> {
+    /// These stages and their sum.
+    pub fn new(stages: &'a [(&'static str, Duration)]) -> Self {
+        Self { total: micros(stages.iter().map(|(_, time)| *time).sum()), stages }
     }
 }
 
@@ -209,7 +255,7 @@ impl From<&SolverReport> for SolverAnswer {
     }
 }
 
-fn points<S: Serializer>(points: &&[Point3<f64>], serializer: S) -> Result<S::Ok, S::Error> {
+pub(super) fn points<S: Serializer>(points: &&[Point3<f64>], serializer: S) -> Result<S::Ok, S::Error> {
     let mut list = serializer.serialize_seq(Some(points.len()))?;
     for point in *points {
         list.serialize_element(&[point.x, point.y, point.z])?;
@@ -217,7 +263,7 @@ fn points<S: Serializer>(points: &&[Point3<f64>], serializer: S) -> Result<S::Ok
     list.end()
 }
 
-fn vectors<S: Serializer>(vectors: &&[Vector3<f64>], serializer: S) -> Result<S::Ok, S::Error> {
+pub(super) fn vectors<S: Serializer>(vectors: &&[Vector3<f64>], serializer: S) -> Result<S::Ok, S::Error> {
     let mut list = serializer.serialize_seq(Some(vectors.len()))?;
     for vector in *vectors {
         list.serialize_element(&[vector.x, vector.y, vector.z])?;

@@ -96,6 +96,9 @@ pub struct TissueSpec {
     /// The bond between retina and choroid.
     #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub bond: Option<BondSpec>,
+    /// What of the tissue depends on time; read by `POST /v1/simulate` alone.
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
+    pub rate: Option<RateSpec>,
 }
 
 /// How the retina holds on to the pigment epithelium under it; a number left out is the default.
@@ -108,6 +111,31 @@ pub struct BondSpec {
     /// Energy that letting go costs, mN/mm (the same number in N/m), 0.06 to 0.6; 0.14 when left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_mn_per_mm: Option<f64>,
+}
+
+/// What of the tissue depends on time; a number left out is its default.
+#[derive(Clone, Debug, Default, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RateSpec {
+    /// Prony series of the retina's shear modulus above the lasting one, which is that of the layer; seven terms when left out, none for `[]`.
+    #[serde(default, deserialize_with = "object::optional_list", skip_serializing_if = "Option::is_none")]
+    pub retina_relaxation: Option<Vec<PronyTermSpec>>,
+    /// Density of every layer, kg/mm³.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub density_kg_per_mm3: Option<f64>,
+    /// Pressure of the vitreous on the surface for its velocity, kPa·s/mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vitreous_drag_kpa_s_per_mm: Option<f64>,
+}
+
+/// One term of a Prony series.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PronyTermSpec {
+    /// Relaxation time, s.
+    pub relaxation_time_s: f64,
+    /// Share of the instantaneous shear modulus that relaxes with it; all shares together leave the lasting one.
+    pub share: f64,
 }
 
 /// The retina as one layer or as several.

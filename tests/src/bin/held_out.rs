@@ -8,8 +8,8 @@ use std::error::Error;
 use retina_core::predict::{Level, Workspace};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
+use retina_core::working_range::WorkingRange;
 use retina_tests::held_out::{HeldOut, Limit, PATH, ROUNDING_UM, Sample, displacements_um, prepare};
-use retina_tests::working_range::WorkingRange;
 
 /// Requests per scene unless told.
 const PER_SCENE: usize = 8;

@@ -5,12 +5,12 @@
 
 use std::time::Instant;
 
+use retina_core::comparison::{node_errors_um, quantile};
 use retina_core::needle::NeedleShape;
 use retina_core::predict::{Level, PredictError, Prediction, PreparedScene, Workspace};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
-use retina_tests::statistics::{node_errors_um, quantile};
-use retina_tests::working_range::WorkingRange;
+use retina_core::working_range::WorkingRange;
 
 /// Requests per run unless told.
 const REQUESTS: usize = 100;

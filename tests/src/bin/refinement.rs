@@ -6,12 +6,12 @@
 use std::time::Instant;
 
 use nalgebra::{Point3, Unit, Vector3};
+use retina_core::comparison::node_errors_um;
 use retina_core::needle::{Gauge, Needle, NeedleShape};
 use retina_core::predict::finite_element::{REFERENCE, Resolution};
 use retina_core::predict::{Control, EffectChoice, Level, PredictError, PreparedScene, Request, Workspace};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
-use retina_tests::statistics::node_errors_um;
 
 /// Gauges compared, with a force that indents the default tissue by about half the retina's thickness or more (mN).
 const CASES: [(&str, f64); 3] = [("41G", 0.08), ("25G", 1.0), ("23G", 1.4)];

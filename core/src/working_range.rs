@@ -5,10 +5,10 @@
 
 use std::f64::consts::{PI, TAU};
 
+use crate::needle::{Gauge, Needle, NeedleShape};
+use crate::predict::{Control, EffectChoice, Level, PUNCTURE_PRESSURE_PER_MODULUS, Request};
+use crate::tissue::Tissue;
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
-use retina_core::needle::{Gauge, Needle, NeedleShape};
-use retina_core::predict::{Control, EffectChoice, Level, PUNCTURE_PRESSURE_PER_MODULUS, Request};
-use retina_core::tissue::Tissue;
 
 /// Gauges of the working range.
 pub const GAUGES: [&str; 4] = ["41G", "27G", "25G", "23G"];

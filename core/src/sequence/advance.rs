@@ -1,0 +1,178 @@
+//! One step of a simulation: where its mesh stands, what it starts from, its equilibrium, and what is remembered of it.
+//!
+//! The start is the state before, moved by the difference of what linear elasticity expects of the two steps: exact for small steps, as good as
+//! a fresh start for large ones.
+
+use nalgebra::Vector3;
+
+use super::history::History;
+use super::plan::{fits, outside, pressed};
+use super::{Laid, Settled, Simulation, Step};
+use crate::equilibrium::{Load, MeshSize, Motion};
+use crate::predict::expected_error::ExpectedError;
+use crate::predict::finite_element::{ContactEstimate, Problem};
+use crate::predict::linear::LinearAnswer;
+use crate::predict::{CutOrGrid, Level, PredictError, Prediction, Question};
+use crate::progress::Progress;
+
+/// How far a needle without a force is drawn back along its shaft (mm): nothing of the patch reaches it there.
+const WITHDRAWN_MM: f64 = 100.0;
+
+/// The mesh of a step.
+struct Aim {
+    contact: Option<ContactEstimate>,
+    size: MeshSize,
+    /// Whether it was laid for this step.
+    laid: bool,
+    /// What the caller should know of it.
+    warnings: Vec<String>,
+}
+
+impl Simulation<'_> {
+    /// The answer to `step`, and whether a mesh was laid for it.
+    pub(super) fn advance(
+        &mut self,
+        step: &Step,
+        progress: &mut dyn Progress,
+    ) -> Result<(Prediction, bool), PredictError> {
+        progress.stage("linear");
+        let request = self.sequence.request(step, &self.needle);
+        let (prepared, body) = (self.prepared, self.body);
+        // The patch is taken out so that the question may borrow it while the rest of the state changes.
+        let patch = self.patch.patch().clone();
+        let question = Question::new(prepared, &request, &body, CutOrGrid::Grid(&patch));
+        let linear = pressed(&question)?;
+        let (prediction, laid) = if self.decision.contact && (linear.is_some() || self.rates.any()) {
+            self.solve(&question, linear.as_ref(), step.time_s - self.time_s, progress)?
+        } else {
+            self.settled = None;
+            let why = match (self.decision.contact, question.motion.force_mn) {
+                (false, _) => "contact is not simulated",
+                (true, Some(0.0)) => "no force is applied",
+                (true, _) => "the needle does not reach the surface",
+            };
+            (question.at_rest(self.decision.clone(), None, why), false)
+        };
+        self.needle.tip_mm = prediction.needle.tip_mm;
+        self.needle.orientation = request.needle.orientation;
+        Ok((prediction, laid))
+    }
+
+    /// The mesh of a step: that which is laid, or a new one where that does not fit and nothing is remembered.
+    fn aim(
+        &mut self,
+        question: &Question,
+        linear: Option<&LinearAnswer>,
+        problem: &Problem,
+        progress: &mut dyn Progress,
+    ) -> Result<Aim, PredictError> {
+        let contact = linear.map(|linear| question.estimate(linear));
+        let remembers = self.rates.any();
+        let fitting = |mesh: &ContactEstimate| contact.as_ref().is_none_or(|contact| fits(mesh, contact));
+        let kept = self.laid.clone().filter(|laid| remembers || fitting(&laid.contact));
+        let laid = match &kept {
+            Some(laid) => laid.clone(),
+            None => {
+                let (mut around, warning) = match remembers {
+                    true => self.plan.middle().unwrap_or((NO_CONTACT, None)),
+                    // A step whose contact turned out other than planned gets a mesh of its own.
+                    false => (self.plan.aim(self.next).filter(fitting).or(contact).unwrap_or(NO_CONTACT), None),
+                };
+                if let (Level::Reference, Some(linear)) = (question.request.level, linear.filter(|_| !remembers)) {
+                    // The finer mesh is made for the contact that `coarse` finds, as in a single prediction.
+                    let found = question.coarse(linear, &self.decision, None, &mut self.coarse, progress)?.estimate;
+                    around = ContactEstimate { center: found.center, radius_mm: found.radius_mm, ..around };
+                }
+                self.settled = None;
+                Laid { contact: around, size: problem.mesh(self.resolution, &around), warning }
+            }
+        };
+        self.laid = Some(laid.clone());
+        let left = contact.as_ref().filter(|_| remembers).and_then(|contact| outside(&laid.contact, contact));
+        let warnings = laid.warning.into_iter().chain(left).collect();
+        Ok(Aim { contact, size: laid.size, laid: kept.is_none(), warnings })
+    }
+
+    fn solve(
+        &mut self,
+        question: &Question,
+        linear: Option<&LinearAnswer>,
+        step_s: f64,
+        progress: &mut dyn Progress,
+    ) -> Result<(Prediction, bool), PredictError> {
+        let problem = question.problem(&self.decision, None);
+        let aim = self.aim(question, linear, &problem, progress)?;
+        progress.stage("mesh");
+        let topology = self.topology.clone();
+        let wall = problem.wall(&topology, self.resolution, &aim.size)?;
+        if self.rates.any() && self.history.is_none() {
+            let tissue = &self.prepared.scene().tissue;
+            self.history = Some(History::at_rest(self.rates, tissue, &topology, &wall.geometry.rest));
+        }
+        let withdrawn = question.motion.force_mn == Some(0.0);
+        let (motion, touch_mm) = match &aim.contact {
+            Some(contact) => problem.aimed(&wall, self.resolution, contact),
+            None => {
+                let travel_mm = if withdrawn { -WITHDRAWN_MM } else { 0.0 };
+                let direction = question.tool.patch_from_needle.rotation * -Vector3::z_axis();
+                (Motion { direction, force_mn: None, travel_mm }, travel_mm)
+            }
+        };
+        let mut expected = match linear {
+            Some(linear) => wall.displaced(&question.start(linear)),
+            None => wall.start(),
+        };
+        wall.place_tip(&mut expected, &(motion.direction.into_inner() * motion.travel_mm));
+        let start = self.start(&expected, &motion);
+        progress.stage("equilibrium");
+        let level = question.request.level.name();
+        let solver = &mut self.solver;
+        let solved = match &self.history {
+            Some(history) => history.with_additions(&wall, step_s, |additions| {
+                wall.solve(&Load { motion: &motion, touch_mm, additions }, start, solver, progress)
+            }),
+            None => wall.solve(&Load { motion: &motion, touch_mm, additions: &[] }, start, solver, progress),
+        };
+        let equilibrium = solved.map_err(|cause| PredictError::Solver { level, cause })?;
+        if let Some(history) = &mut self.history {
+            history.commit(&wall, &equilibrium.positions, step_s);
+        }
+        progress.stage("surface");
+        let mut answer = problem.answer(&wall, self.resolution, &equilibrium, touch_mm);
+        if withdrawn {
+            answer.travel_mm = 0.0;
+        } else {
+            answer = question.with_node_penetration(answer);
+        }
+        self.settled = Some(Settled { positions: equilibrium.positions, expected, pressed: linear.is_some() });
+        let mut expected_error = match linear {
+            Some(linear) => question.situation_under(linear).expected_error(question.request.level),
+            None => ExpectedError::UNKNOWN,
+        };
+        // Quantiles were measured on single equilibria.
+        expected_error.calibrated &= self.history.is_none();
+        let mut prediction = question.prediction(answer, self.decision.clone(), expected_error);
+        prediction.warnings.extend(aim.warnings);
+        Ok((prediction, aim.laid))
+    }
+
+    /// Positions to start from.
+    fn start(&self, expected: &[f64], motion: &Motion) -> Vec<f64> {
+        let Some(settled) = &self.settled else { return expected.to_vec() };
+        let mut start: Vec<f64> = settled
+            .positions
+            .iter()
+            .zip(expected.iter().zip(&settled.expected))
+            .map(|(settled, (now, before))| settled + (now - before))
+            .collect();
+        // A needle that is held stands exactly where it is told; one that was elsewhere has nothing to go on from.
+        if motion.force_mn.is_none() || !settled.pressed {
+            let tip = 3 * self.topology.needle();
+            start[tip..].copy_from_slice(&expected[tip..]);
+        }
+        start
+    }
+}
+
+/// Stands for a contact where there is none: the mesh is then laid around the patch's centre.
+const NO_CONTACT: ContactEstimate = ContactEstimate { center: [0.0; 2], radius_mm: 0.1, touch_mm: 0.0, travel_mm: 0.0 };

@@ -1,0 +1,71 @@
+//! What the tissue of one mesh remembers from step to step, and the effects that it acts through.
+
+use super::rates::{Rates, networks};
+use crate::effects::inertia::{Inertia, Momentum, VitreousDrag};
+use crate::effects::viscoelasticity::Networks;
+use crate::equilibrium::{Addition, Wall};
+use crate::mesh::wall::{Place, WallTopology};
+use crate::tissue::{LayerKind, Tissue};
+
+/// The memory of every effect that is simulated.
+#[derive(Clone, Debug)]
+pub(super) struct History {
+    networks: Option<Networks>,
+    momentum: Option<Momentum>,
+    density_kg_per_mm3: Vec<f64>,
+    drag_kpa_s_per_mm: f64,
+}
+
+impl History {
+    /// Tissue that has been at rest for long.
+    pub fn at_rest(rates: Rates, tissue: &Tissue, topology: &WallTopology, rest: &[f64]) -> Self {
+        let layers = tissue.layers();
+        let shear = |&layer: &usize| match layers[layer].kind {
+            LayerKind::Retina(_) => layers[layer].layer.shear_modulus_kpa(),
+            _ => 0.0,
+        };
+        let shear_kpa = topology.element_layer.iter().map(shear).collect();
+        History {
+            networks: rates.viscoelasticity.then(|| Networks::at_rest(shear_kpa, networks(tissue))),
+            momentum: rates.inertia.then(|| Momentum::at_rest(rest.to_vec())),
+            density_kg_per_mm3: vec![tissue.rate.density_kg_per_mm3; topology.elements.len()],
+            drag_kpa_s_per_mm: tissue.rate.vitreous_drag_kpa_s_per_mm,
+        }
+    }
+
+    /// Calls `visit` with the effects of a step of `step_s` (s).
+    pub fn with_additions<T>(&self, wall: &Wall, step_s: f64, visit: impl FnOnce(&[Addition]) -> T) -> T {
+        let topology = wall.topology();
+        let viscous = self.networks.as_ref().map(|networks| networks.step(&wall.geometry.solid, step_s));
+        let coasting = self.momentum.as_ref().map(|momentum| momentum.coasting(step_s));
+        let inertia = coasting.as_ref().map(|coasting| Inertia {
+            geometry: &wall.geometry.solid,
+            stencils: &topology.elements,
+            density_kg_per_mm3: &self.density_kg_per_mm3,
+            coasting,
+            step_s,
+        });
+        let drag = self.momentum.as_ref().map(|momentum| VitreousDrag {
+            faces: wall.faces(),
+            stencils: &topology.faces,
+            start: momentum.positions(),
+            drag_kpa_s_per_mm: self.drag_kpa_s_per_mm,
+            step_s,
+        });
+        let mut additions = Vec::new();
+        additions.extend(viscous.as_ref().map(|effect| Addition { effect, place: Place::Elements }));
+        additions.extend(inertia.as_ref().map(|effect| Addition { effect, place: Place::Elements }));
+        additions.extend(drag.as_ref().map(|effect| Addition { effect, place: Place::Faces }));
+        visit(&additions)
+    }
+
+    /// Remembers the end of a step of `step_s` (s) at these positions (mm).
+    pub fn commit(&mut self, wall: &Wall, positions: &[f64], step_s: f64) {
+        if let Some(networks) = &mut self.networks {
+            networks.commit(&wall.geometry.solid, &wall.topology().elements, positions, step_s);
+        }
+        if let Some(momentum) = &mut self.momentum {
+            momentum.commit(positions, step_s);
+        }
+    }
+}

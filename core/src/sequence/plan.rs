@@ -1,0 +1,206 @@
+//! Every step by linear elasticity, before the first is computed: checks, expected contacts, and which steps one mesh fits.
+//!
+//! Checking takes a fraction of a millisecond a step, so a sequence that cannot be is refused before it begins. Where a step leaves its
+//! needle's place to the step before, linear elasticity says where that is.
+
+use nalgebra::Vector3;
+
+use super::{Sequence, SequenceError, Step, TIME_STEP};
+use crate::needle::{Body, Needle};
+use crate::predict::choice::Expected;
+use crate::predict::choice::adhesion::Pull;
+use crate::predict::choice::friction::Sliding;
+use crate::predict::finite_element::ContactEstimate;
+use crate::predict::linear::LinearAnswer;
+use crate::predict::{Control, CutOrGrid, EffectReport, PredictError, PreparedScene, Question, Request};
+use crate::progress::Progress;
+use crate::solve::newton::NewtonError;
+
+/// What linear elasticity expects of a sequence.
+pub(super) struct Plan {
+    /// The contact of each step; `None` where the needle does not press.
+    pub contacts: Vec<Option<ContactEstimate>>,
+    /// The deepest contact.
+    pub deepest: Expected,
+    /// What is decided of the eye's pressure.
+    pub pressure: EffectReport,
+    /// The shortest time in which the load changes between two steps (s); infinite if it never does.
+    pub fastest_change_s: f64,
+}
+
+/// Largest distance of a contact's centre from the mesh's, and largest difference of their radii, in radii of the contact that the mesh was
+/// laid around. On a mesh as coarse as `coarse` a contact that is off by more moves nodes by more than that level's own error (measured).
+const LARGEST_MISFIT: f64 = 0.02;
+/// How far a contact may reach from the middle of a lasting mesh, in radii of its fine zone.
+const LARGEST_REACH: f64 = 1.25;
+/// Fine zone of a lasting mesh, in radii of the largest contact, from which on its elements are coarse for every contact.
+const WIDEST_ZONE: f64 = 2.0;
+
+impl Plan {
+    /// The contact to lay a mesh around for step `from` and as many after it as that mesh fits: the largest of theirs.
+    pub fn aim(&self, from: usize) -> Option<ContactEstimate> {
+        let mut held: Vec<ContactEstimate> = Vec::new();
+        let mut aim: Option<ContactEstimate> = None;
+        for contact in self.contacts[from..].iter().flatten() {
+            // The first one that is not fitted ends the run: what follows gets a mesh of its own.
+            let wider = aim.filter(|aim| aim.radius_mm >= contact.radius_mm).unwrap_or(*contact);
+            held.push(*contact);
+            if !held.iter().all(|contact| fits(&wider, contact)) {
+                break;
+            }
+            aim = Some(wider);
+        }
+        aim
+    }
+
+    /// The contact to lay one mesh around for all steps: in the middle of all contacts, and as wide as all together. What the caller should know
+    /// of such a mesh.
+    pub fn middle(&self) -> Option<(ContactEstimate, Option<String>)> {
+        let contacts = || self.contacts.iter().flatten();
+        let largest = contacts().copied().reduce(|a, b| if b.radius_mm > a.radius_mm { b } else { a })?;
+        let center = [0, 1].map(|k| {
+            let (low, high) = contacts().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), contact| {
+                (low.min(contact.center[k]), high.max(contact.center[k]))
+            });
+            0.5 * (low + high)
+        });
+        let middle = ContactEstimate { center, ..largest };
+        let radius_mm = contacts().map(|contact| reach_mm(&middle, contact)).fold(0.0, f64::max);
+        let warning = (radius_mm > WIDEST_ZONE * largest.radius_mm).then(|| {
+            format!(
+                "the contacts wander over {radius_mm:.3} mm around the middle of the mesh, which is coarse for contacts of {:.3} mm radius",
+                largest.radius_mm
+            )
+        });
+        Some((ContactEstimate { radius_mm, ..middle }, warning))
+    }
+}
+
+fn offset_mm(mesh: &ContactEstimate, contact: &ContactEstimate) -> f64 {
+    (contact.center[0] - mesh.center[0]).hypot(contact.center[1] - mesh.center[1])
+}
+
+/// How far a contact reaches from the middle of a mesh (mm).
+fn reach_mm(mesh: &ContactEstimate, contact: &ContactEstimate) -> f64 {
+    offset_mm(mesh, contact) + contact.radius_mm
+}
+
+/// Whether a mesh laid around `mesh` resolves `contact` as well as one of its own would.
+pub(super) fn fits(mesh: &ContactEstimate, contact: &ContactEstimate) -> bool {
+    let allowed_mm = LARGEST_MISFIT * mesh.radius_mm;
+    offset_mm(mesh, contact) <= allowed_mm && (contact.radius_mm - mesh.radius_mm).abs() <= allowed_mm
+}
+
+/// What the caller should know of `contact` on a lasting mesh laid around `mesh`: that it has left the fine zone.
+pub(super) fn outside(mesh: &ContactEstimate, contact: &ContactEstimate) -> Option<String> {
+    let (reach_mm, zone_mm) = (reach_mm(mesh, contact), LARGEST_REACH * mesh.radius_mm);
+    (reach_mm > zone_mm).then(|| {
+        format!("the contact reaches {reach_mm:.3} mm from the middle of the mesh, beyond its fine zone of {zone_mm:.3} mm: the surface is less accurate there")
+    })
+}
+
+impl Sequence {
+    /// The step as a request of its own, with `needle` where the step before left it.
+    pub(super) fn request(&self, step: &Step, needle: &Needle) -> Request {
+        let needle = Needle {
+            tip_mm: step.tip_mm.unwrap_or(needle.tip_mm),
+            orientation: step.orientation.unwrap_or(needle.orientation),
+            ..*needle
+        };
+        let control = step.force_mn.map_or(Control::Pose, Control::Force);
+        Request { needle, control, level: self.level, effects: self.effects.clone() }
+    }
+
+    fn check_times(&self) -> Result<(), SequenceError> {
+        let mut before_s = 0.0;
+        for (index, step) in self.steps.iter().enumerate() {
+            let step_s = step.time_s - before_s;
+            TIME_STEP.check("", step_s).map_err(|error| SequenceError::Time {
+                step: index,
+                step_s,
+                min_s: error.min,
+                max_s: error.max,
+            })?;
+            before_s = step.time_s;
+        }
+        Ok(())
+    }
+}
+
+/// The linear answer of a step; `None` where the needle does not press.
+pub(super) fn pressed<'b>(question: &'b Question) -> Result<Option<LinearAnswer<'b>>, PredictError> {
+    if question.motion.force_mn == Some(0.0) {
+        return Ok(None);
+    }
+    question.pressed(&question.tool)
+}
+
+/// Checks every step, in the frame of the patch under the first that loads.
+///
+/// # Errors
+/// [`SequenceError`] of the first step that cannot be.
+pub(super) fn plan<'a>(
+    prepared: &'a PreparedScene,
+    sequence: &Sequence,
+    body: &Body,
+    progress: &mut dyn Progress,
+) -> Result<(CutOrGrid<'a>, Plan), SequenceError> {
+    let loads = |step: &&Step| step.force_mn.is_none_or(|force| force != Vector3::zeros());
+    let first = sequence.steps.iter().find(loads).or(sequence.steps.first()).ok_or(SequenceError::NoSteps)?;
+    sequence.check_times()?;
+    let at = |index: usize, cause: PredictError| {
+        let time_s = sequence.steps[index].time_s;
+        SequenceError::At { step: index, time_s, cause }
+    };
+    sequence.needle.validate().map_err(|error| at(0, error.into()))?;
+    let patch = prepared.patch_for(&sequence.request(first, &sequence.needle), body).map_err(|cause| at(0, cause))?;
+    let sliding = Sliding { coefficient: prepared.scene().friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
+    let tissue = &prepared.scene().tissue;
+    let pull =
+        Pull { normal_force_mn: 0.0, depth_mm: tissue.retina_thickness_mm(), strength_kpa: tissue.bond.strength_kpa };
+    let mut plan = Plan {
+        contacts: Vec::with_capacity(sequence.steps.len()),
+        deepest: Expected { depth_mm: 0.0, strain: 0.0, sliding, pull },
+        pressure: Question::new(
+            prepared,
+            &sequence.request(first, &sequence.needle),
+            body,
+            CutOrGrid::Grid(patch.patch()),
+        )
+        .sink()
+        .report,
+        fastest_change_s: f64::INFINITY,
+    };
+    let mut needle = sequence.needle;
+    let (mut before_s, mut load_before) = (0.0, None);
+    for (index, step) in sequence.steps.iter().enumerate() {
+        if progress.interrupted() {
+            let cause = NewtonError::Interrupted { iterations: 0 };
+            return Err(at(index, PredictError::Solver { level: sequence.level.name(), cause }));
+        }
+        let request = sequence.request(step, &needle);
+        request.needle.validate().map_err(|error| at(index, error.into()))?;
+        let question = Question::new(prepared, &request, body, CutOrGrid::Grid(patch.patch()));
+        let linear = pressed(&question).map_err(|cause| at(index, cause))?;
+        needle = request.needle;
+        if let Some(linear) = &linear {
+            if step.force_mn.is_some() {
+                let direction = patch.patch().scene_from_patch * question.motion.direction.into_inner();
+                needle.tip_mm += direction * linear.travel_mm();
+            }
+            if linear.depth_mm > plan.deepest.depth_mm {
+                let strain = linear.depth_mm / question.yielding_mm();
+                let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
+                let pull = Pull { normal_force_mn: linear.normal_force_mn, ..pull };
+                plan.deepest = Expected { depth_mm: linear.depth_mm, strain, sliding, pull };
+            }
+        }
+        let load = linear.as_ref().map(|linear| (linear.depth_mm, linear.center));
+        if load != load_before {
+            plan.fastest_change_s = plan.fastest_change_s.min(step.time_s - before_s);
+        }
+        (before_s, load_before) = (step.time_s, load);
+        plan.contacts.push(linear.as_ref().map(|linear| question.estimate(linear)));
+    }
+    Ok((patch, plan))
+}

@@ -1,0 +1,117 @@
+//! Which effects that remember a sequence calls for: the time in which its load changes against the times of the tissue.
+//!
+//! - `viscoelasticity`: the stress that the networks still bear at the end of the fastest change of the load, over the elastic one:
+//!   Σ β A for a linear load over that time ([`Network::borne`]). It tends to 0 for loads slow against every relaxation time.
+//! - `inertia`: a linear load over a time T overshoots by at most T₁/(π T) of itself (undamped oscillator under a ramp), T₁ the slowest period. For
+//!   T₁ the layers that yield are taken as one quarter wave of shear, T₁ = 4 Σ thickness/√(µ/ρ): nothing else of the wall is slower.
+
+use std::f64::consts::PI;
+
+use super::Sequence;
+use super::plan::Plan;
+use crate::effects::viscoelasticity::Network;
+use crate::effects::{adhesion, friction, inertia, pressure, viscoelasticity};
+use crate::predict::choice::{Decision, decide as decide_static};
+use crate::predict::{EffectChoice, EffectReport, PredictError, PreparedScene};
+use crate::tissue::{LayerKind, Tissue};
+
+/// Share of the elastic stress or displacement below which `auto` leaves an effect of rate out: the relative error that `reference` itself has.
+pub const RATE_TOLERANCE: f64 = 0.01;
+
+/// The effects that remember, those that are simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Rates {
+    pub viscoelasticity: bool,
+    pub inertia: bool,
+}
+
+impl Rates {
+    /// Whether anything is remembered.
+    pub fn any(self) -> bool {
+        self.viscoelasticity || self.inertia
+    }
+}
+
+/// The networks of the retina.
+pub(super) fn networks(tissue: &Tissue) -> Vec<Network> {
+    let lasting = tissue.rate.lasting_share();
+    let network = |term: &crate::tissue::rate::PronyTerm| Network {
+        relaxation_time_s: term.relaxation_time_s,
+        modulus_ratio: term.share / lasting,
+    };
+    tissue.rate.retina_relaxation.iter().map(network).collect()
+}
+
+/// Slowest period of the layers that yield (s).
+pub(super) fn slowest_period_s(tissue: &Tissue) -> f64 {
+    let density = tissue.rate.density_kg_per_mm3;
+    let yielding = tissue.layers().into_iter().filter(|named| named.kind != LayerKind::Sclera);
+    let crossing_s: f64 = yielding.map(|n| n.layer.thickness_mm / (n.layer.shear_modulus_kpa() / density).sqrt()).sum();
+    4.0 * crossing_s
+}
+
+/// Effects of single equilibria that a sequence leaves out, and says so.
+const STATIC_ONLY: [&str; 3] = [friction::NAME, pressure::NAME, adhesion::NAME];
+
+/// Decides for the whole sequence.
+///
+/// # Errors
+/// [`PredictError::Effect`], as for a single request.
+pub(super) fn decide(
+    prepared: &PreparedScene,
+    sequence: &Sequence,
+    plan: &Plan,
+) -> Result<(Decision, Rates), PredictError> {
+    let tissue = &prepared.scene().tissue;
+    if let EffectChoice::Named(names) = &sequence.effects
+        && let Some(name) = names.iter().find(|name| STATIC_ONLY.contains(&name.as_str()))
+    {
+        return Err(PredictError::Effect { name: name.clone(), problem: "is not simulated in a sequence".to_owned() });
+    }
+    let mut decision = decide_static(&sequence.effects, sequence.level, plan.deepest, &plan.pressure)?;
+    decision.friction = false;
+    decision.adhesion = false;
+    for report in decision.reports.iter_mut().filter(|report| STATIC_ONLY.contains(&report.name) && report.simulated) {
+        report.simulated = false;
+        report.reason += "; not simulated in a sequence";
+    }
+    let change_s = plan.fastest_change_s;
+    let networks = networks(tissue);
+    let borne: f64 = networks.iter().map(|network| network.borne(change_s)).sum();
+    let longest_s = networks.iter().fold(0.0, |longest: f64, network| longest.max(network.relaxation_time_s));
+    let period_s = slowest_period_s(tissue);
+    let overshoot = period_s / (PI * change_s);
+    let touches = change_s.is_finite() && decision.contact;
+    let mut judge = |name: &'static str, value: f64, times: String| {
+        let called_for = value > RATE_TOLERANCE;
+        let (simulated, why) = match &sequence.effects {
+            _ if !touches => (false, "the needle presses in no step".to_owned()),
+            EffectChoice::Auto => (called_for, times),
+            EffectChoice::All => (true, "asked for with `all`".to_owned()),
+            EffectChoice::Named(names) => (names.iter().any(|n| n == name), "as listed in the request".to_owned()),
+        };
+        let report = EffectReport {
+            name,
+            simulated,
+            reason: why,
+            value: touches.then_some(value),
+            threshold: touches.then_some(RATE_TOLERANCE),
+        };
+        if let Some(place) = decision.reports.iter_mut().find(|report| report.name == name) {
+            *place = report;
+        }
+        simulated
+    };
+    let relaxation = format!(
+        "the load changes within {change_s:.3e} s, the retina relaxes over up to {longest_s:.3e} s: its networks bear this share of the elastic \
+         stress beside it"
+    );
+    let vibration = format!(
+        "the load changes within {change_s:.3e} s, the slowest period is {period_s:.3e} s: the tissue overshoots by up to this share"
+    );
+    let rates = Rates {
+        viscoelasticity: judge(viscoelasticity::NAME, borne, relaxation) && !networks.is_empty(),
+        inertia: judge(inertia::NAME, overshoot, vibration),
+    };
+    Ok((decision, rates))
+}

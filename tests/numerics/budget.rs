@@ -1,0 +1,70 @@
+//! Which level keeps a promise: the choice against every level's own numbers.
+
+use retina_core::needle::NeedleShape;
+use retina_core::predict::budget::{Budget, DEFAULT_LEVEL, LevelTimes};
+use retina_core::predict::expected_error::Situation;
+use retina_core::predict::{Level, PredictError};
+use retina_core::scene::Scene;
+
+const TIMES_MS: LevelTimes = [0.1, 12.0, 3000.0];
+
+fn pressed() -> Situation {
+    let scene = Scene::built_in("macula").unwrap();
+    Situation::new(&scene, &NeedleShape::hemispherical(0.257), 20.0, 0.06, 0.15)
+}
+
+fn choose(budget: Budget) -> (Level, usize) {
+    let choice = budget.choose(&pressed(), &TIMES_MS).unwrap();
+    (choice.level, choice.broken.len())
+}
+
+#[test]
+fn nothing_promised_is_the_default_level() {
+    assert_eq!(choose(Budget::default()), (DEFAULT_LEVEL, 0));
+}
+
+#[test]
+fn an_error_asks_for_the_cheapest_level_that_keeps_it() {
+    let errors = Level::ALL.map(|level| pressed().expected_error(level));
+    assert!(errors.iter().all(|error| error.calibrated && error.median_um < error.p95_um), "{errors:?}");
+    assert!(errors[0].p95_um > errors[1].p95_um && errors[1].p95_um > errors[2].p95_um, "{errors:?}");
+    for (level, error) in Level::ALL.iter().zip(&errors) {
+        let asking = |um| choose(Budget { max_error_um: Some(um), ..Budget::default() });
+        assert_eq!(asking(error.p95_um), (*level, 0));
+        assert_ne!(asking(error.p95_um * 0.999), (*level, 0));
+    }
+}
+
+#[test]
+fn a_time_asks_for_the_most_accurate_level_in_it() {
+    let asking = |ms| choose(Budget { max_time_ms: Some(ms), ..Budget::default() });
+    assert_eq!(asking(5000.0), (Level::Reference, 0));
+    assert_eq!(asking(2999.0), (Level::Coarse, 0));
+    assert_eq!(asking(0.1), (Level::Linear, 0));
+    assert_eq!(asking(0.05), (Level::Linear, 1));
+}
+
+#[test]
+fn what_cannot_be_kept_is_said_or_refused() {
+    let both = Budget { max_error_um: Some(0.51), max_time_ms: Some(1.0), ..Budget::default() };
+    assert_eq!(choose(both), (Level::Linear, 1));
+    let refused = Budget { strict: true, ..both }.choose(&pressed(), &TIMES_MS);
+    assert!(matches!(refused, Err(PredictError::Budget { .. })), "{refused:?}");
+    let fixed = Budget { level: Some(Level::Coarse), ..both };
+    assert_eq!(choose(fixed), (Level::Coarse, 2));
+}
+
+#[test]
+fn outside_of_what_was_measured_nothing_is_called_calibrated() {
+    let scene = Scene::built_in("macula").unwrap();
+    let situation = |shape: &NeedleShape, angle| Situation::new(&scene, shape, angle, 0.06, 0.15);
+    assert!(pressed().sampled);
+    assert!(!situation(&NeedleShape::hemispherical(0.45), 20.0).sampled);
+    assert!(!situation(&NeedleShape::hemispherical(0.257), 74.0).sampled);
+    let mut softer = scene.clone();
+    softer.tissue.retina[0].youngs_modulus_kpa *= 0.5;
+    assert!(!Situation::new(&softer, &NeedleShape::hemispherical(0.257), 20.0, 0.06, 0.15).sampled);
+    // Nothing that moves nothing is wrong.
+    let still = Situation::new(&softer, &NeedleShape::hemispherical(0.257), 20.0, 0.0, 0.0);
+    assert_eq!(still.expected_error(Level::Linear).p95_um, 0.0);
+}

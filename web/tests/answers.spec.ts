@@ -1,0 +1,89 @@
+/** Levels, comparison, effects, refusals: what the server says is what the page says. */
+
+import { expect, open, settled, test } from "./fixture";
+
+test("a level is switched by its button and by its key", async ({ retina }) => {
+  const level = (): Promise<string | undefined> =>
+    retina.evaluate(() => window.retina.answer?.accuracy.level);
+  expect(await level()).toBe("linear");
+  await retina.locator("label", { hasText: /^coarse$/ }).click();
+  await expect.poll(level).toBe("coarse");
+  await expect(retina.locator(".facts")).toContainText("coarse");
+  await retina.locator("#view").focus();
+  await retina.keyboard.press("1");
+  await expect.poll(level).toBe("linear");
+});
+
+test("compare shows the true error of every level, node by node", async ({ retina }) => {
+  await retina.locator("#compare").click();
+  const rows = retina.locator("#comparison tbody tr");
+  await expect(rows).toHaveCount(3, { timeout: 60_000 });
+  await expect(rows.last()).toContainText("reference");
+  await retina.locator("label", { hasText: /^error$/ }).click();
+  const { errors, linear } = await retina.evaluate(() => ({
+    errors: window.retina.errorsUm ?? [],
+    linear: window.retina.comparison?.rows.find(({ level }) => level === "linear"),
+  }));
+  expect(errors).toHaveLength(64);
+  expect(linear?.errors.maxUm).toBeCloseTo(Math.max(...errors), 6);
+  expect(linear?.errors.maxUm).toBeGreaterThan(0.5);
+  expect(linear?.errors.meanUm).toBeLessThan(linear?.errors.maxUm ?? 0);
+  await expect(retina.locator("#legend")).toContainText("Error, µm");
+  await retina.screenshot({ path: "artefacts/error.png" });
+  await retina.keyboard.press("s");
+  await settled(retina);
+  expect(await retina.evaluate(() => window.retina.errorsUm)).toBeUndefined();
+});
+
+test("a puncture is refused in words, beside the force, with a way back", async ({
+  retina,
+  server,
+}) => {
+  await open(retina, server, "#gauge=41G&force=0.08");
+  await retina.locator("input[type=number]").first().fill("5");
+  await retina.keyboard.press("Enter");
+  const banner = retina.locator("#banner");
+  await expect(banner).toContainText("would puncture");
+  await expect(retina.locator(".number .complaint").first()).toContainText("at most");
+  await retina.getByRole("button", { name: /Set the force to/ }).click();
+  await expect(banner).toBeHidden();
+  expect(await retina.evaluate(() => window.retina.settings.forceMn)).toBeLessThan(0.2);
+});
+
+test("a tolerance is asked for; what the server cannot do is said in its words", async ({
+  retina,
+}) => {
+  await retina.locator("label", { hasText: /^tolerance/ }).click();
+  await settled(retina);
+  const { request, problem, answer } = await retina.evaluate(() => {
+    const { settings, problem, answer } = window.retina;
+    return { request: settings.accuracy, problem, answer };
+  });
+  expect(request).toEqual({ max_error_um: 5 });
+  if (problem) await expect(retina.locator("#banner")).toContainText("max_error_um");
+  else expect(answer?.accuracy.expected_error_um).toBeDefined();
+});
+
+test("effects are listed with their reason, and switched", async ({ retina, server }) => {
+  await open(retina, server, "#level=coarse");
+  await retina.getByText("Effects", { exact: true }).click();
+  const row = retina.locator(".effects li", { hasText: "finite strain" });
+  await expect(row.locator(".state")).toHaveText("simulated");
+  await expect(row.locator(".note")).not.toBeEmpty();
+  await row.locator("input").uncheck();
+  await expect(row.locator(".state")).toHaveText("not simulated");
+  expect(await retina.evaluate(() => window.retina.request?.effects)).not.toContain(
+    "finite_strain",
+  );
+});
+
+test("a number of the tissue changes the answer", async ({ retina }) => {
+  const deepest = (): Promise<number> =>
+    retina.evaluate(() => Math.max(...(window.retina.answer?.surface.displacement_um ?? [])));
+  const before = await deepest();
+  await retina.getByText("Tissue", { exact: true }).click();
+  const choroid = retina.locator("[data-panel=tissue] section", { hasText: "choroid" });
+  await choroid.locator("input[type=number]").nth(1).fill("60");
+  await retina.keyboard.press("Enter");
+  await expect.poll(deepest).toBeLessThan(0.8 * before);
+});
