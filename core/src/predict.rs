@@ -259,11 +259,10 @@ impl Question<'_> {
     ) -> Result<Prediction, PredictError> {
         let sink = self.sink();
         let sliding = Sliding { coefficient: self.prepared.scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
-        let bond = self.prepared.scene.tissue.bond;
         let pull = Pull {
             normal_force_mn: 0.0,
             depth_mm: self.prepared.scene.tissue.retina_thickness_mm(),
-            strength_kpa: bond.strength_kpa,
+            strength_kpa: self.prepared.scene.tissue.bond.strength_kpa,
         };
         let linear = match self.begin(&self.raised(&sink))? {
             Begun::Pressed(linear) => linear,

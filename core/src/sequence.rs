@@ -205,7 +205,7 @@ impl<'a> Simulation<'a> {
             _ if rates.any() => &LASTING,
             _ => &COARSE,
         });
-        let topology = shared_topology(resolution.division(&prepared.scene().tissue, decision.adhesion))
+        let topology = shared_topology(resolution.division(&prepared.scene().tissue, false))
             .map_err(|error| first(PredictError::Mesh(error)))?;
         let solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
         Ok(Simulation {

@@ -109,10 +109,10 @@ pub struct Tissue {
     pub choroid: Layer,
     /// Sclera.
     pub sclera: Layer,
-    /// What depends on time.
-    pub rate: RateProperties,
     /// The bond between retina and choroid.
     pub bond: RetinalBond,
+    /// What depends on time.
+    pub rate: RateProperties,
 }
 
 /// Young's moduli of five layers of the rabbit retina in vivo, from the vitreous outwards, kPa (PMC5783626, acoustic radiation
@@ -127,8 +127,8 @@ impl Default for Tissue {
             retina: vec![ranges::RETINA.default_layer()],
             choroid: ranges::CHOROID.default_layer(),
             sclera: ranges::SCLERA.default_layer(),
-            rate: RateProperties::default(),
             bond: RetinalBond::default(),
+            rate: RateProperties::default(),
         }
     }
 }

@@ -69,7 +69,8 @@ pub(super) fn decide(
         return Err(PredictError::Effect { name: name.clone(), problem: "is not simulated in a sequence".to_owned() });
     }
     let mut decision = decide_static(&sequence.effects, sequence.level, plan.deepest, &plan.pressure)?;
-    (decision.friction, decision.adhesion) = (false, false);
+    decision.friction = false;
+    decision.adhesion = false;
     for report in decision.reports.iter_mut().filter(|report| STATIC_ONLY.contains(&report.name) && report.simulated) {
         report.simulated = false;
         report.reason += "; not simulated in a sequence";

@@ -101,6 +101,18 @@ pub struct TissueSpec {
     pub rate: Option<RateSpec>,
 }
 
+/// How the retina holds on to the pigment epithelium under it; a number left out is the default.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BondSpec {
+    /// Largest traction, kPa, 1 to 100; 40 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub strength_kpa: Option<f64>,
+    /// Energy that letting go costs, mN/mm (the same number in N/m), 0.06 to 0.6; 0.14 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fracture_energy_mn_per_mm: Option<f64>,
+}
+
 /// What of the tissue depends on time; a number left out is its default.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -124,18 +136,6 @@ pub struct PronyTermSpec {
     pub relaxation_time_s: f64,
     /// Share of the instantaneous shear modulus that relaxes with it; all shares together leave the lasting one.
     pub share: f64,
-}
-
-/// How the retina holds on to the pigment epithelium under it; a number left out is the default.
-#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct BondSpec {
-    /// Largest traction, kPa, 1 to 100; 40 when left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub strength_kpa: Option<f64>,
-    /// Energy that letting go costs, mN/mm (the same number in N/m), 0.06 to 0.6; 0.14 when left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub fracture_energy_mn_per_mm: Option<f64>,
 }
 
 /// The retina as one layer or as several.
