@@ -1,7 +1,7 @@
 //! The bytes of a request, within bounds of size and time.
 //!
-//! Contract: never more than [`LIMIT_BYTES`] of one body in memory, and never more than [`LARGE_AT_ONCE`] large bodies. A body beyond that is read on and thrown away up to [`DISCARD_BYTES`], because a
-//! client that is cut off while it writes does not get to read why.
+//! Contract: never more than [`LIMIT_BYTES`] of one body in memory, and never more than [`LARGE_AT_ONCE`] large bodies. A body beyond that is
+//! read on and thrown away up to [`DISCARD_BYTES`], because a client that is cut off while it writes does not get to read why.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -73,6 +73,7 @@ async fn collect(mut body: Body, large: &Arc<Semaphore>) -> Result<Received, Pro
     let mut joined = Vec::new();
     let mut length = 0;
     let mut permit = None;
+    let mut one_too_many = false;
     while let Some(frame) = body.frame().await {
         let frame =
             frame.map_err(|error| Problem::new(Kind::MalformedJson, format!("The body breaks off: {error}.")))?;
@@ -83,14 +84,11 @@ async fn collect(mut body: Body, large: &Arc<Semaphore>) -> Result<Received, Pro
         if length > DISCARD_BYTES {
             break;
         }
-        if length >= LARGE_BYTES && permit.is_none() {
-            let free = Arc::clone(large).try_acquire_owned();
-            permit =
-                Some(free.map_err(|_| {
-                    Problem::new(Kind::Busy, "Too many large bodies are at work; try again in a second.")
-                })?);
+        if length >= LARGE_BYTES && permit.is_none() && !one_too_many {
+            permit = Arc::clone(large).try_acquire_owned().ok();
+            one_too_many = permit.is_none();
         }
-        if length > LIMIT_BYTES {
+        if one_too_many || length > LIMIT_BYTES {
             (first, joined) = (Bytes::new(), Vec::new());
         } else if length == data.len() {
             // Most bodies come in one piece, which is used as it is.
@@ -101,6 +99,9 @@ async fn collect(mut body: Body, large: &Arc<Semaphore>) -> Result<Received, Pro
             }
             joined.extend_from_slice(&data);
         }
+    }
+    if one_too_many {
+        return Err(Problem::new(Kind::Busy, "Too many large bodies are at work; try again in a second."));
     }
     if length > LIMIT_BYTES {
         let detail = format!("The body has more than {LIMIT_BYTES} bytes.");
