@@ -47,7 +47,7 @@ export interface PredictResponse {
   contact: { state: string; area_mm2: number; max_strain: number; max_pressure_kpa: number };
   accuracy: {
     level: string;
-    expected_error_um?: { median: number; p95: number };
+    expected_error_um?: { median?: number; p95?: number };
     calibrated?: boolean;
   };
   effects: EffectAnswer[];

@@ -111,7 +111,7 @@ function showFacts(list: HTMLElement, session: Session): void {
   const { shown } = session;
   if (!shown) return;
   const { accuracy, time_us } = shown.answer;
-  const expected = accuracy.expected_error_um;
+  const { median, p95 } = accuracy.expected_error_um ?? {};
   const errors = errorsOnScreen(session);
   const rows: [string, string][] = [
     ["Answered by", accuracy.level],
@@ -119,9 +119,9 @@ function showFacts(list: HTMLElement, session: Session): void {
     ["Round trip", `${figures(shown.roundTripMs)} ms`],
     [
       "Expected error",
-      expected
-        ? `${figures(expected.median)} µm, 95 %: ${figures(expected.p95)} µm${accuracy.calibrated === false ? " (outside the calibrated range)" : ""}`
-        : "not stated by this server",
+      median !== undefined && p95 !== undefined
+        ? `${figures(median)} µm, 95 %: ${figures(p95)} µm${accuracy.calibrated === false ? " (outside the calibrated range)" : ""}`
+        : "not measured for requests like this",
     ],
     [
       "True error",

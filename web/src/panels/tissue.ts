@@ -8,6 +8,8 @@ import { button, checkbox, element, panel } from "./dom";
 import { perFrame } from "../per_frame";
 import { NumberControl } from "./number_control";
 
+/** What depends on time has no part in a single equilibrium, which is all that the page asks for. */
+const OF_TIME = "scene.tissue.rate.";
 const MEMBRANE = "scene.tissue.inner_limiting_membrane.";
 
 /** `scene.tissue.retina.thickness_mm` belongs to `retina`. */
@@ -41,7 +43,8 @@ export function tissuePanel(page: Page): void {
     const hasMembrane = Object.keys(now.parameters).some((field) => field.startsWith(MEMBRANE));
     const listed = catalog.scenes.parameters.filter(
       ({ field }) =>
-        numberAt(spec, field) !== undefined || (hasMembrane && field.startsWith(MEMBRANE)),
+        !field.startsWith(OF_TIME) &&
+        (numberAt(spec, field) !== undefined || (hasMembrane && field.startsWith(MEMBRANE))),
     );
     const wanted = [now.scene, ...listed.map(({ field }) => field)].join(" ");
     if (wanted !== key) {
