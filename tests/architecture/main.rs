@@ -62,9 +62,8 @@ const ONE_WAY: [(&str, &[&str]); 17] = [
 const LONGEST: usize = 400;
 
 /// Longer files, and why they are one file.
-const LONG_FILES: [(&str, &str); 4] = [
+const LONG_FILES: [(&str, &str); 3] = [
     ("core/src/equilibrium.rs", "one wall under one needle: mesh, touch, load steps and report share their state"),
-    ("core/src/predict.rs", "the facade, read top to bottom as one request passes through it"),
     ("tests/numerics/effects.rs", "one derivative check with a row for each effect"),
     (
         "tests/verification/finite_element/block.rs",

@@ -1,0 +1,258 @@
+//! A request answered: by each level, at rest where nothing presses, and back in the scene's coordinates.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector3};
+
+use super::choice::adhesion::Pull;
+use super::choice::friction::Sliding;
+use super::choice::{Decision, Expected};
+use super::expected_error::ExpectedError;
+use super::finite_element::{Bench, COARSE, ContactEstimate, FiniteElementAnswer, Problem, Resolution};
+use super::linear::LinearAnswer;
+use super::question::{Begun, Question, Sink};
+use super::topologies::shared_topology;
+use super::types::{ContactReport, ContactState, Level, NeedleOutcome, PredictError, Prediction, SolverReport};
+use super::{PENETRATION_WARNING_MM, Workspace};
+use crate::effects::{adhesion, contact, friction};
+use crate::equilibrium::Solid;
+use crate::equilibrium::settled::Settled;
+use crate::patch::vertex_normals;
+use crate::progress::Progress;
+use crate::solve::newton;
+
+impl Question<'_> {
+    pub(super) fn answer(
+        &self,
+        resolution: &Resolution,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Prediction, PredictError> {
+        let sink = self.sink();
+        let sliding = Sliding { coefficient: self.prepared.scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
+        let pull = Pull {
+            normal_force_mn: 0.0,
+            depth_mm: self.prepared.scene.tissue.retina_thickness_mm(),
+            strength_kpa: self.prepared.scene.tissue.bond.strength_kpa,
+        };
+        let linear = match self.begin(&self.raised(&sink))? {
+            Begun::Pressed(linear) => linear,
+            Begun::Still(why) => {
+                let strain = sink.expected_mm / self.yielding_mm();
+                let decision = self.decide(Expected { depth_mm: sink.expected_mm, strain, sliding, pull }, &sink)?;
+                return Ok(self.at_rest(decision, sink.change_kpa, why));
+            }
+        };
+        let strain = linear.depth_mm / self.yielding_mm();
+        let moved_mm = linear.depth_mm + sink.expected_mm;
+        let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
+        let [x, y] = linear.press.touch.parameter;
+        let pull = Pull {
+            normal_force_mn: linear.normal_force_mn,
+            depth_mm: pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
+            ..pull
+        };
+        let expected = Expected { depth_mm: moved_mm, strain: moved_mm / self.yielding_mm(), sliding, pull };
+        let decision = self.decide(expected, &sink)?;
+        if !decision.contact {
+            return Ok(self.at_rest(decision, sink.change_kpa, "contact is not simulated"));
+        }
+        let answer = match self.request.level {
+            Level::Linear => self.linear(&linear, strain, &sink),
+            Level::Coarse => self.coarse(&linear, &decision, sink.change_kpa, workspace, progress)?,
+            Level::Reference => self.fine(resolution, &linear, &decision, sink.change_kpa, workspace, progress)?,
+        };
+        let expected = self.situation_under(&linear).expected_error(self.request.level);
+        Ok(self.prediction(self.with_node_penetration(answer), decision, expected))
+    }
+
+    /// Adds to the reported penetration that of the patch's own nodes: a coarse face may cut a sharp edge between its quadrature points.
+    pub(crate) fn with_node_penetration(&self, mut answer: FiniteElementAnswer) -> FiniteElementAnswer {
+        let mut pose = self.tool.patch_from_needle;
+        pose.translation.vector += self.motion.direction.into_inner() * answer.travel_mm;
+        let penetration = |(vertex, moved): (&Point3<f64>, &Vector3<f64>)| {
+            -self.tool.body.distance(&pose.inverse_transform_point(&(vertex + moved)))
+        };
+        let nodes = self.patch().vertices.iter().zip(&answer.displacements).map(penetration);
+        answer.contact.max_penetration_mm = nodes.fold(answer.contact.max_penetration_mm, f64::max);
+        answer
+    }
+
+    pub(super) fn linear(&self, linear: &LinearAnswer, strain: f64, sink: &Sink) -> FiniteElementAnswer {
+        let settled = self.settled(sink.change_kpa, Solid::Elasticity);
+        let radius_mm = linear.contact_radius_mm;
+        let travel_mm = if self.motion.force_mn.is_some() { linear.travel_mm() } else { 0.0 };
+        let moved = |&parameter: &[f64; 2]| linear.displacement(parameter) + self.sunk(settled.as_ref(), parameter);
+        let displacements: Vec<Vector3<f64>> = self.patch().parameters.iter().map(moved).collect();
+        FiniteElementAnswer {
+            displacements,
+            travel_mm,
+            reaction_mn: linear.press.touch.inward.into_inner() * -linear.normal_force_mn,
+            contact: ContactReport {
+                state: ContactState::Touching,
+                area_mm2: std::f64::consts::PI * radius_mm * radius_mm,
+                max_pressure_kpa: linear.max_pressure_kpa,
+                max_penetration_mm: 0.0,
+                max_strain: strain,
+                slipping_share: None,
+                bond_damage: None,
+            },
+            solver: SolverReport::default(),
+            estimate: self.estimate(linear),
+        }
+    }
+
+    /// Linear surface displacement, fading with depth as the layers share a uniform pressure.
+    pub(crate) fn start<'b>(&self, linear: &'b LinearAnswer) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
+        let layers = self.prepared.scene.tissue.layers();
+        let compliance: Vec<f64> =
+            layers.iter().map(|named| named.layer.thickness_mm / named.layer.youngs_modulus_kpa).collect();
+        let total: f64 = compliance.iter().sum();
+        move |parameter, depth_in_layers| {
+            let above: f64 = compliance
+                .iter()
+                .enumerate()
+                .map(|(layer, c)| c * (depth_in_layers - layer as f64).clamp(0.0, 1.0))
+                .sum();
+            linear.displacement(parameter) * (1.0 - above / total)
+        }
+    }
+
+    pub(crate) fn problem(&self, decision: &Decision, pressure_kpa: Option<f64>) -> Problem<'_> {
+        Problem {
+            patch: self.patch(),
+            tissue: &self.prepared.scene.tissue,
+            tool: self.tool,
+            motion: self.motion,
+            solid: decision.solid,
+            friction_coefficient: decision.friction.then_some(self.prepared.scene.friction_coefficient),
+            pressure_kpa,
+            bond: decision.adhesion.then_some(self.prepared.scene.tissue.bond),
+        }
+    }
+
+    pub(crate) fn coarse(
+        &self,
+        linear: &LinearAnswer,
+        decision: &Decision,
+        change_kpa: Option<f64>,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<FiniteElementAnswer, PredictError> {
+        let topology = shared_topology(COARSE.division(&self.prepared.scene.tissue, decision.adhesion))?;
+        let (_, solver) = match &mut workspace.coarse {
+            Some(kept) if Arc::ptr_eq(&kept.0, &topology) => kept,
+            slot => {
+                let memory = newton::Workspace::new(&topology.pattern, &topology.symbolic);
+                slot.insert((topology.clone(), memory))
+            }
+        };
+        let mut bench =
+            Bench { level: Level::Coarse.name(), resolution: &COARSE, topology: &topology, workspace: solver };
+        let start = self.start(linear);
+        self.problem(decision, change_kpa).solve(&mut bench, &self.estimate(linear), &start, progress)
+    }
+
+    /// A finer answer than `coarse`, on a mesh made for the contact that `coarse` finds.
+    pub(super) fn fine(
+        &self,
+        resolution: &Resolution,
+        linear: &LinearAnswer,
+        decision: &Decision,
+        change_kpa: Option<f64>,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<FiniteElementAnswer, PredictError> {
+        let coarse = self.coarse(linear, decision, change_kpa, workspace, progress)?;
+        let topology = shared_topology(resolution.division(&self.prepared.scene.tissue, decision.adhesion))?;
+        let mut solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
+        let mut bench =
+            Bench { level: Level::Reference.name(), resolution, topology: &topology, workspace: &mut solver };
+        // Travel and start belong together: a needle off by a micrometre opens the contact or closes it with a thousand kPa.
+        let aim = ContactEstimate {
+            center: coarse.estimate.center,
+            radius_mm: coarse.estimate.radius_mm,
+            ..self.estimate(linear)
+        };
+        let start = self.start(linear);
+        let mut answer = self.problem(decision, change_kpa).solve(&mut bench, &aim, &start, progress)?;
+        answer.solver.iterations += coarse.solver.iterations;
+        Ok(answer)
+    }
+
+    /// The answer without contact: the surface at rest, or where the pressure moves it.
+    pub(crate) fn at_rest(&self, mut decision: Decision, change_kpa: Option<f64>, reason: &str) -> Prediction {
+        for report in &mut decision.reports {
+            if [contact::NAME, friction::NAME, adhesion::NAME].contains(&report.name) {
+                report.simulated = false;
+                report.reason = reason.to_owned();
+            }
+        }
+        let settled = self.settled(change_kpa, decision.solid);
+        let moved = |&parameter: &[f64; 2]| self.sunk(settled.as_ref(), parameter);
+        let answer = FiniteElementAnswer {
+            displacements: self.patch().parameters.iter().map(moved).collect(),
+            travel_mm: 0.0,
+            reaction_mn: Vector3::zeros(),
+            contact: ContactReport {
+                state: ContactState::Clear,
+                area_mm2: 0.0,
+                max_pressure_kpa: 0.0,
+                max_penetration_mm: 0.0,
+                max_strain: settled.as_ref().map_or(0.0, Settled::max_strain),
+                slipping_share: None,
+                bond_damage: None,
+            },
+            solver: SolverReport::default(),
+            estimate: ContactEstimate { center: [0.0; 2], radius_mm: 0.0, touch_mm: 0.0, travel_mm: 0.0 },
+        };
+        // Nothing moves, exactly.
+        let expected = ExpectedError { median_um: 0.0, p95_um: 0.0, calibrated: true };
+        self.prediction(answer, decision, expected)
+    }
+
+    /// The answer in scene coordinates.
+    pub(crate) fn prediction(
+        &self,
+        answer: FiniteElementAnswer,
+        decision: Decision,
+        expected: ExpectedError,
+    ) -> Prediction {
+        let patch = self.patch();
+        let deformed: Vec<Point3<f64>> =
+            patch.vertices.iter().zip(&answer.displacements).map(|(vertex, moved)| vertex + moved).collect();
+        let normals = vertex_normals(&deformed, &patch.triangles);
+        let frame = &patch.scene_from_patch;
+        let direction = frame * self.motion.direction.into_inner();
+        let mut warnings = Vec::new();
+        let unused = decision.reports.iter().find(|r| !r.simulated && r.value > r.threshold && r.value.is_some());
+        if let Some(effect) = unused {
+            warnings.push(format!("`{}` is not simulated though the scene calls for it", effect.name));
+        }
+        let penetration_mm = answer.contact.max_penetration_mm;
+        if penetration_mm > PENETRATION_WARNING_MM {
+            warnings.push(format!(
+                "the needle stands {:.1} µm inside the predicted surface: its edge is sharper than this level resolves",
+                penetration_mm * 1e3
+            ));
+        }
+        Prediction {
+            vertices: deformed.iter().map(|vertex| frame * vertex).collect(),
+            normals: normals.iter().map(|normal| frame * normal).collect(),
+            triangles: patch.triangles.clone(),
+            displacement_um: answer.displacements.iter().map(|moved| moved.norm() * 1e3).collect(),
+            source_indices: patch.source_indices.clone(),
+            needle: NeedleOutcome {
+                tip_mm: self.request.needle.tip_mm + direction * answer.travel_mm,
+                travel_mm: answer.travel_mm,
+                reaction_mn: frame * answer.reaction_mn,
+            },
+            contact: answer.contact,
+            level: self.request.level,
+            expected_error: expected,
+            effects: decision.reports,
+            solver: answer.solver,
+            warnings,
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! A request in the frame of the patch: what it comes to before any level computes it, and the limits that it must keep.
+
+use nalgebra::{Unit, Vector3};
+
+use super::choice::{Decision, Expected, decide, pressure};
+use super::expected_error::Situation;
+use super::finite_element::ContactEstimate;
+use super::linear::{LinearAnswer, Load, Press, press};
+use super::types::{Control, EffectChoice, EffectReport, Level, PredictError, Request};
+use super::{MAX_DEPTH_SHARE, PUNCTURE_PRESSURE_PER_MODULUS, PreparedScene};
+use crate::effects::finite_strain;
+use crate::equilibrium::settled::Settled;
+use crate::equilibrium::{Motion, Solid, Tool};
+use crate::needle::Body;
+use crate::patch::Patch;
+use crate::scene::Scene;
+/// A grid's patch is the scene's, a cut one the request's own.
+pub(crate) enum CutOrGrid<'a> {
+    Grid(&'a Patch),
+    Cut(Box<Patch>),
+}
+
+impl CutOrGrid<'_> {
+    pub(crate) fn patch(&self) -> &Patch {
+        match self {
+            CutOrGrid::Grid(patch) => patch,
+            CutOrGrid::Cut(patch) => patch,
+        }
+    }
+}
+
+/// A request in the patch frame.
+pub(crate) struct Question<'a> {
+    pub(crate) prepared: &'a PreparedScene,
+    pub(crate) request: &'a Request,
+    patch: CutOrGrid<'a>,
+    pub(crate) tool: Tool<'a>,
+    pub(crate) motion: Motion,
+}
+
+impl<'a> Question<'a> {
+    /// The request in the frame of `patch`.
+    pub(crate) fn new(prepared: &'a PreparedScene, request: &'a Request, body: &'a Body, patch: CutOrGrid<'a>) -> Self {
+        let frame = patch.patch().scene_from_patch;
+        let patch_from_needle = frame.inverse() * request.needle.scene_from_needle();
+        let motion = match request.control {
+            Control::Force(force) => Motion {
+                direction: Unit::try_new(frame.inverse() * force, 0.0).unwrap_or(-Vector3::z_axis()),
+                force_mn: Some(force.norm()),
+                travel_mm: 0.0,
+            },
+            Control::Pose => {
+                Motion { direction: patch_from_needle.rotation * -Vector3::z_axis(), force_mn: None, travel_mm: 0.0 }
+            }
+        };
+        Question { prepared, request, patch, tool: Tool { body, patch_from_needle }, motion }
+    }
+}
+
+/// What a request comes to before any level computes it.
+pub(super) enum Begun<'a> {
+    /// Nothing moves, for this reason.
+    Still(&'static str),
+    /// The needle presses.
+    Pressed(LinearAnswer<'a>),
+}
+
+/// What the eye's pressure does by itself.
+pub(crate) struct Sink {
+    /// The decision about the effect.
+    pub(crate) report: EffectReport,
+    /// Change of the pressure (kPa), where it is simulated.
+    pub(super) change_kpa: Option<f64>,
+    /// Sinking that linear elasticity expects of it at the patch's centre, in magnitude (mm); 0 where it is not simulated.
+    pub(super) expected_mm: f64,
+}
+
+impl Question<'_> {
+    pub(crate) fn patch(&self) -> &Patch {
+        self.patch.patch()
+    }
+
+    /// The linear answer inside the limits of the tissue model; `None` where the needle does not reach the surface.
+    pub(crate) fn pressed(&self, tool: &Tool) -> Result<Option<LinearAnswer<'_>>, PredictError> {
+        let press = press(self.patch(), tool, &self.motion)?;
+        self.check_pressure(&press)?;
+        if matches!(press.load, Load::Depth(depth) if depth <= 0.0) {
+            return Ok(None);
+        }
+        let tip = self.request.needle.shape.tip;
+        let linear = LinearAnswer::new(&self.prepared.beds, self.patch(), tool, tip, press, &self.motion.direction)?;
+        self.check_depth(&linear)?;
+        Ok(Some(linear))
+    }
+
+    /// The linear answer, or why nothing moves.
+    pub(super) fn begin(&self, tool: &Tool) -> Result<Begun<'_>, PredictError> {
+        if self.motion.force_mn == Some(0.0) {
+            return Ok(Begun::Still("no force is applied"));
+        }
+        Ok(match self.pressed(tool)? {
+            Some(linear) => Begun::Pressed(linear),
+            None => Begun::Still("the needle does not reach the surface"),
+        })
+    }
+
+    pub(crate) fn situation_under(&self, linear: &LinearAnswer) -> Situation {
+        self.situation(linear.depth_mm, linear.depth_mm / self.yielding_mm(), Some(&linear.press))
+    }
+
+    pub(super) fn situation(&self, depth_mm: f64, strain: f64, press: Option<&Press>) -> Situation {
+        let points = self.tool.patch_from_needle.rotation * -Vector3::z_axis();
+        let angle_deg = press.map_or(0.0, |press| points.dot(&press.touch.inward).clamp(-1.0, 1.0).acos().to_degrees());
+        Situation::new(&self.prepared.scene, &self.request.needle.shape, angle_deg, depth_mm, strain)
+    }
+
+    /// What the eye's pressure does by itself.
+    pub(crate) fn sink(&self) -> Sink {
+        let Scene { tissue, .. } = &self.prepared.scene;
+        let change_kpa = self.prepared.scene.pressure_change_kpa();
+        let linear = Settled::new(tissue, change_kpa, Solid::Elasticity, |_| true);
+        let centre = self.patch().surface.column(0.0, 0.0);
+        let report = pressure::report(&self.request.effects, change_kpa, linear.sink_mm(&centre, 0.0) * 1e3);
+        let simulated = report.simulated;
+        let expected_mm = if simulated { linear.sink_mm(&centre, 0.0).abs() } else { 0.0 };
+        Sink { report, change_kpa: simulated.then_some(change_kpa), expected_mm }
+    }
+
+    pub(super) fn decide(&self, expected: Expected, sink: &Sink) -> Result<Decision, PredictError> {
+        decide(&self.request.effects, self.request.level, expected, &sink.report)
+    }
+
+    /// The surface far from the needle under the pressure, by the law of `solid`.
+    pub(super) fn settled(&self, change_kpa: Option<f64>, solid: Solid) -> Option<Settled> {
+        change_kpa.map(|change_kpa| Settled::new(&self.prepared.scene.tissue, change_kpa, solid, |_| true))
+    }
+
+    /// How far the surface at `parameter` sinks under the pressure (mm).
+    pub(super) fn sunk(&self, settled: Option<&Settled>, [x, y]: [f64; 2]) -> Vector3<f64> {
+        settled.map_or_else(Vector3::zeros, |settled| {
+            let column = self.patch().surface.column(x, y);
+            column.inward.into_inner() * settled.sink_mm(&column, 0.0)
+        })
+    }
+
+    /// The tool as it stands to the surface at rest: raised by what the surface under it has sunk.
+    pub(super) fn raised(&self, sink: &Sink) -> Tool<'_> {
+        let mut tool = self.tool;
+        if sink.change_kpa.is_some() {
+            // What `decide` will find unless the sinking itself is small.
+            let finite = match &self.request.effects {
+                EffectChoice::Named(names) => names.iter().any(|name| name == finite_strain::NAME),
+                EffectChoice::Auto | EffectChoice::All => true,
+            };
+            let finite = finite && self.request.level != Level::Linear;
+            let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
+            let at = tool.patch_from_needle.translation.vector;
+            tool.patch_from_needle.translation.vector -=
+                self.sunk(self.settled(sink.change_kpa, solid).as_ref(), [at.x, at.y]);
+        }
+        tool
+    }
+
+    /// Thickness of retina and choroid (mm).
+    pub(crate) fn yielding_mm(&self) -> f64 {
+        let tissue = &self.prepared.scene.tissue;
+        tissue.retina_thickness_mm() + tissue.choroid.thickness_mm
+    }
+
+    pub(super) fn check_pressure(&self, press: &Press) -> Result<(), PredictError> {
+        if let Load::Force(force_mn) = press.load {
+            let radius_mm = self.tool.body.radius_mm();
+            let pressure_kpa = force_mn / (std::f64::consts::PI * radius_mm * radius_mm);
+            let softest = |low: f64, layer: &crate::tissue::Layer| low.min(layer.youngs_modulus_kpa);
+            let modulus = self.prepared.scene.tissue.retina.iter().fold(f64::INFINITY, softest);
+            let limit_kpa = PUNCTURE_PRESSURE_PER_MODULUS * modulus;
+            if pressure_kpa > limit_kpa {
+                return Err(PredictError::BeyondPuncture { force_mn, radius_mm, pressure_kpa, limit_kpa });
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn check_depth(&self, linear: &LinearAnswer) -> Result<(), PredictError> {
+        let [x, y] = linear.press.touch.parameter;
+        let thinning_mm = self.patch().surface.column(x, y).retina_thinning_mm;
+        let limit_mm = MAX_DEPTH_SHARE * (self.yielding_mm() - thinning_mm);
+        let depth_mm = linear.depth_mm;
+        if depth_mm > limit_mm { Err(PredictError::TooDeep { depth_mm, limit_mm }) } else { Ok(()) }
+    }
+
+    pub(crate) fn estimate(&self, linear: &LinearAnswer) -> ContactEstimate {
+        ContactEstimate {
+            center: linear.center,
+            radius_mm: linear.contact_radius_mm,
+            touch_mm: linear.press.touch.travel_mm,
+            travel_mm: linear.travel_mm(),
+        }
+    }
+}
