@@ -1,7 +1,7 @@
 //! How long the levels take on this machine, as measured by the predictions themselves.
 //!
 //! A level is expected to take as long as the slowest of its last predictions, so that about one in a hundred takes longer. Until there
-//! are enough of them, a first guess counts as one more: half of a gigahertz-class core, so that a promise made early is rather kept.
+//! are enough of them, a generous first guess counts as one more, so that a promise made early is rather kept.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};

@@ -64,6 +64,13 @@ fn outside_of_what_was_measured_nothing_is_called_calibrated() {
     let mut softer = scene.clone();
     softer.tissue.retina[0].youngs_modulus_kpa *= 0.5;
     assert!(!Situation::new(&softer, &NeedleShape::hemispherical(0.257), 20.0, 0.06, 0.15).sampled);
+    // Errors were measured without friction and at the pressure of the rest surface.
+    let (mut rough, mut pressed_eye) = (scene.clone(), scene.clone());
+    rough.friction_coefficient = 0.1;
+    pressed_eye.pressure_kpa += 1.0;
+    for other in [&rough, &pressed_eye] {
+        assert!(!Situation::new(other, &NeedleShape::hemispherical(0.257), 20.0, 0.06, 0.15).sampled);
+    }
     // Nothing that moves nothing is wrong.
     let still = Situation::new(&softer, &NeedleShape::hemispherical(0.257), 20.0, 0.0, 0.0);
     assert_eq!(still.expected_error(Level::Linear).p95_um, 0.0);

@@ -206,8 +206,11 @@ impl Question<'_> {
             solver: SolverReport::default(),
             estimate: ContactEstimate { center: [0.0; 2], radius_mm: 0.0, touch_mm: 0.0, travel_mm: 0.0 },
         };
-        // Nothing moves, exactly.
-        let expected = ExpectedError { median_um: 0.0, p95_um: 0.0, calibrated: true };
+        let expected = match settled {
+            Some(_) => ExpectedError::UNKNOWN,
+            // Nothing moves, exactly.
+            None => ExpectedError { median_um: 0.0, p95_um: 0.0, calibrated: true },
+        };
         self.prediction(answer, decision, expected)
     }
 

@@ -85,6 +85,8 @@ impl Situation {
         let built_in = Scene::built_in_names().iter().filter_map(|name| Scene::built_in(name));
         let sampled = !matches!(scene.surface, SceneSurface::Mesh(_))
             && built_in.into_iter().any(|known| known.tissue == scene.tissue && known.surface == scene.surface)
+            && scene.friction_coefficient == 0.0
+            && scene.pressure_change_kpa() == 0.0
             && (thin_mm..=thick_mm).contains(&shape.radius_mm)
             && default_tip
             && angle_deg <= CALIBRATED_ANGLE_DEG;

@@ -14,6 +14,7 @@ use crate::equilibrium::{Motion, Solid, Tool};
 use crate::needle::Body;
 use crate::patch::Patch;
 use crate::scene::Scene;
+
 /// A grid's patch is the scene's, a cut one the request's own.
 pub(crate) enum CutOrGrid<'a> {
     Grid(&'a Patch),
@@ -120,9 +121,10 @@ impl Question<'_> {
         let change_kpa = self.prepared.scene.pressure_change_kpa();
         let linear = Settled::new(tissue, change_kpa, Solid::Elasticity, |_| true);
         let centre = self.patch().surface.column(0.0, 0.0);
-        let report = pressure::report(&self.request.effects, change_kpa, linear.sink_mm(&centre, 0.0) * 1e3);
+        let sink_mm = linear.sink_mm(&centre, 0.0);
+        let report = pressure::report(&self.request.effects, change_kpa, sink_mm * 1e3);
         let simulated = report.simulated;
-        let expected_mm = if simulated { linear.sink_mm(&centre, 0.0).abs() } else { 0.0 };
+        let expected_mm = if simulated { sink_mm.abs() } else { 0.0 };
         Sink { report, change_kpa: simulated.then_some(change_kpa), expected_mm }
     }
 
