@@ -1,0 +1,7 @@
+//! Data, training and evaluation of the learned retina patch.
+//!
+//! Read in this order: `sample` (one load step of a path, as every program here sees it) → `shard` (samples on disk) → `dataset` (how
+//! they are made).
+
+pub mod sample;
+pub mod shard;
