@@ -9,12 +9,13 @@
 use nalgebra::{Point3, Vector3};
 use thiserror::Error;
 
-use super::{ATTEMPTS, Addition, Drive, Equilibrium, Load, RELATIVE_TOLERANCE, Wall};
+use super::attempts::{ATTEMPTS, RELATIVE_TOLERANCE};
+use super::{Addition, Equilibrium, Load, Wall};
 use crate::effect::{Effect, Local};
 use crate::effects::friction::{Friction, RubbingPoint, anchor};
 use crate::mesh::wall::Place;
 use crate::progress::Progress;
-use crate::solve::newton::{NewtonError, NewtonReport, Workspace};
+use crate::solve::newton::{Drive, NewtonError, NewtonReport, Workspace};
 
 /// Slip from which on friction is at its limit (mm): what sticks creeps by less, a fraction of what the levels resolve.
 pub const FULL_SLIP_MM: f64 = 5e-4;
