@@ -7,6 +7,7 @@ use retina_core::predict::Level;
 use retina_core::predict::budget::DEFAULT_LEVEL;
 use retina_core::range::ParameterRange;
 use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
+use retina_core::scene::puncture::{MAX_FORCE, MAX_STRAIN, PRESSURE_PER_MODULUS, Puncture, PunctureForce};
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::sequence::TIME_STEP;
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
@@ -21,7 +22,8 @@ use crate::wire::catalog::{
     GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
 };
 use crate::wire::scene::{
-    BondSpec, LayerSpec, PronyTermSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec,
+    BondSpec, LayerSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec,
+    TissueSpec,
 };
 
 /// The built-in scenes, and every parameter with its range.
@@ -94,7 +96,16 @@ fn spec(scene: &Scene) -> SceneSpec {
         friction_coefficient: Some(scene.friction_coefficient),
         pressure_kpa: Some(scene.pressure_kpa),
         rest_pressure_kpa: Some(scene.rest_pressure_kpa),
+        puncture: Some(puncture(&scene.puncture)),
     }
+}
+
+fn puncture(puncture: &Puncture) -> PunctureSpec {
+    let (pressure_per_modulus, max_force_mn) = match puncture.force {
+        PunctureForce::PressurePerModulus(share) => (Some(share), None),
+        PunctureForce::Force(force_mn) => (None, Some(force_mn)),
+    };
+    PunctureSpec { pressure_per_modulus, max_force_mn, max_strain: Some(puncture.max_strain) }
 }
 
 fn tissue(tissue: &Tissue) -> TissueSpec {
@@ -153,6 +164,9 @@ fn parameters() -> Vec<ParameterEntry> {
         ("scene.friction_coefficient", &FRICTION_COEFFICIENT),
         ("scene.pressure_kpa", &EYE_PRESSURE),
         ("scene.rest_pressure_kpa", &EYE_PRESSURE),
+        ("scene.puncture.pressure_per_modulus", &PRESSURE_PER_MODULUS),
+        ("scene.puncture.max_force_mn", &MAX_FORCE),
+        ("scene.puncture.max_strain", &MAX_STRAIN),
     ];
     let layers = [
         ("inner_limiting_membrane", &INNER_LIMITING_MEMBRANE),

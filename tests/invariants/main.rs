@@ -8,6 +8,7 @@
 mod effects;
 mod equilibrium;
 mod frames;
+mod puncture;
 mod refusals;
 mod repeatability;
 mod sequences;

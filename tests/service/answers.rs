@@ -101,6 +101,36 @@ fn a_listed_scene_can_be_sent_back_as_it_stands() {
 }
 
 #[test]
+fn puncture_is_always_told() {
+    let row = |answer: &Value| {
+        let effects = answer["effects"].as_array().expect("effects");
+        effects.iter().find(|effect| effect["name"] == "puncture").expect("always there").clone()
+    };
+    for level in ["linear", "coarse"] {
+        for (max_force_mn, state) in [(0.39, "punctured"), (0.41, "touching")] {
+            let scene = json!({"puncture": {"max_force_mn": max_force_mn, "max_strain": 5}});
+            let answer = answered(predict(&with(request(level), "/scene", scene)));
+            assert_matches("PredictResponse", &answer);
+            assert_eq!(answer["contact"]["state"], state, "{level}");
+            let row = row(&answer);
+            assert_eq!((&row["simulated"], &row["threshold"]), (&json!(true), &json!(max_force_mn)));
+            assert!((row["value"].as_f64().expect("number") - 0.4).abs() < 1e-3, "{row}");
+            let told = answer["warnings"].to_string().contains("the tissue is punctured");
+            assert_eq!(told, state == "punctured", "{}", answer["warnings"]);
+        }
+        // Held at a depth and limited by strain: the answer measures it.
+        let held = json!({
+            "needle": {"tip_mm": [0, 0, -0.1]}, "control": "pose", "accuracy": {"level": level},
+            "scene": {"puncture": {"max_strain": 0.02}},
+        });
+        let answer = answered(predict(&held));
+        assert_eq!(answer["contact"]["state"], "punctured");
+        assert!(row(&answer)["reason"].as_str().expect("text").ends_with("the strain"), "{}", row(&answer));
+        assert_eq!(row(&answer)["value"], answer["contact"]["max_strain"]);
+    }
+}
+
+#[test]
 fn a_needle_that_stays_away_moves_nothing() {
     let request = json!({
         "needle": {"tip_mm": [0, 0, 1]}, "control": "pose", "accuracy": {"level": "linear"},

@@ -220,6 +220,23 @@ fn a_needle_or_a_force_that_points_away() {
 }
 
 #[test]
+fn limits_of_puncture() {
+    let limited = |puncture: Value| predict(&with(request("linear"), "/scene", json!({"puncture": puncture})));
+    let cases = [
+        (json!({"max_strain": 0}), "scene.puncture.max_strain", "0.01 to 5"),
+        (json!({"max_force_mn": -1}), "scene.puncture.max_force_mn", "0.001 to 100 mN"),
+        (json!({"pressure_per_modulus": 0.8}), "scene.puncture.pressure_per_modulus", "0.005 to 0.75"),
+    ];
+    for (puncture, field, allowed) in cases {
+        assert_eq!(assert_field(&limited(puncture), 422, "out-of-range", field)["allowed"], allowed);
+    }
+    let both = limited(json!({"max_force_mn": 1, "pressure_per_modulus": 0.5}));
+    assert_field(&both, 422, "invalid-request", "scene.puncture.max_force_mn");
+    assert_problem(&limited(json!({"force": 1})), 422, "invalid-request");
+    assert_eq!(limited(json!({})).status, 200);
+}
+
+#[test]
 fn a_press_outside_of_the_patch_or_beyond_the_tissue() {
     let reply = predict(&with(request("coarse"), "/needle/tip_mm", json!([5, 0, 0])));
     assert_field(&reply, 422, "outside-patch", "needle.tip_mm");

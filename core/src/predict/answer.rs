@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::choice::adhesion::Pull;
 use super::choice::friction::Sliding;
-use super::choice::{Decision, Expected};
+use super::choice::{self, Decision, Expected};
 use super::expected_error::ExpectedError;
 use super::finite_element::{Bench, COARSE, ContactEstimate, FiniteElementAnswer, Problem, Resolution};
 use super::linear::LinearAnswer;
@@ -14,7 +14,8 @@ use super::question::{Begun, Question, Sink};
 use super::topologies::shared_topology;
 use super::types::{ContactReport, ContactState, Level, NeedleOutcome, PredictError, Prediction, SolverReport};
 use super::{PENETRATION_WARNING_MM, Workspace};
-use crate::effects::{adhesion, contact, friction};
+use crate::effects::puncture::{Burden, Nearest};
+use crate::effects::{adhesion, contact, friction, puncture};
 use crate::equilibrium::Solid;
 use crate::equilibrium::settled::Settled;
 use crate::patch::vertex_normals;
@@ -35,11 +36,13 @@ impl Question<'_> {
             depth_mm: self.prepared.scene.tissue.retina_thickness_mm(),
             strength_kpa: self.prepared.scene.tissue.bond.strength_kpa,
         };
+        let limits = self.puncture_limits();
         let linear = match self.begin(&self.raised(&sink))? {
             Begun::Pressed(linear) => linear,
             Begun::Still(why) => {
                 let strain = sink.expected_mm / self.yielding_mm();
-                let decision = self.decide(Expected { depth_mm: sink.expected_mm, strain, sliding, pull }, &sink)?;
+                let expected = Expected { depth_mm: sink.expected_mm, strain, sliding, pull, limits };
+                let decision = self.decide(expected, &sink)?;
                 return Ok(self.at_rest(decision, sink.change_kpa, why));
             }
         };
@@ -52,7 +55,7 @@ impl Question<'_> {
             depth_mm: pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
             ..pull
         };
-        let expected = Expected { depth_mm: moved_mm, strain: moved_mm / self.yielding_mm(), sliding, pull };
+        let expected = Expected { depth_mm: moved_mm, strain: moved_mm / self.yielding_mm(), sliding, pull, limits };
         let decision = self.decide(expected, &sink)?;
         if !decision.contact {
             return Ok(self.at_rest(decision, sink.change_kpa, "contact is not simulated"));
@@ -96,6 +99,7 @@ impl Question<'_> {
                 max_strain: strain,
                 slipping_share: None,
                 bond_damage: None,
+                puncture_share: 0.0,
             },
             solver: SolverReport::default(),
             estimate: self.estimate(linear),
@@ -202,6 +206,7 @@ impl Question<'_> {
                 max_strain: settled.as_ref().map_or(0.0, Settled::max_strain),
                 slipping_share: None,
                 bond_damage: None,
+                puncture_share: 0.0,
             },
             solver: SolverReport::default(),
             estimate: ContactEstimate { center: [0.0; 2], radius_mm: 0.0, touch_mm: 0.0, travel_mm: 0.0 },
@@ -214,11 +219,30 @@ impl Question<'_> {
         self.prediction(answer, decision, expected)
     }
 
+    /// Holds the answer against what the tissue bears; what to say if it is more.
+    fn judge(&self, answer: &mut FiniteElementAnswer, decision: &mut Decision) -> Option<String> {
+        let limits = self.puncture_limits();
+        let burden = match answer.contact.state {
+            ContactState::Clear => Burden::default(),
+            _ => Burden { force_mn: answer.reaction_mn.norm(), strain: answer.contact.max_strain },
+        };
+        for report in decision.reports.iter_mut().filter(|report| report.name == puncture::NAME) {
+            *report = choice::puncture::report(&limits, &burden);
+        }
+        let nearest = limits.nearest(&burden);
+        answer.contact.puncture_share = nearest.share();
+        nearest.is_beyond().then(|| {
+            answer.contact.state = ContactState::Punctured;
+            let Nearest { measure, value, limit, .. } = nearest;
+            format!("the tissue is punctured: the {measure} is {value:.4}, beyond {limit:.4}; the surface is that of tissue as if it were still whole")
+        })
+    }
+
     /// The answer in scene coordinates.
     pub(crate) fn prediction(
         &self,
-        answer: FiniteElementAnswer,
-        decision: Decision,
+        mut answer: FiniteElementAnswer,
+        mut decision: Decision,
         expected: ExpectedError,
     ) -> Prediction {
         let patch = self.patch();
@@ -228,6 +252,7 @@ impl Question<'_> {
         let frame = &patch.scene_from_patch;
         let direction = frame * self.motion.direction.into_inner();
         let mut warnings = Vec::new();
+        warnings.extend(self.judge(&mut answer, &mut decision));
         let unused = decision.reports.iter().find(|r| !r.simulated && r.value > r.threshold && r.value.is_some());
         if let Some(effect) = unused {
             warnings.push(format!("`{}` is not simulated though the scene calls for it", effect.name));

@@ -4,8 +4,10 @@ pub mod adhesion;
 mod criterion;
 pub mod friction;
 pub mod pressure;
+pub mod puncture;
 
 use super::types::{EffectChoice, EffectReport, Level, PredictError};
+use crate::effects::puncture::{Burden, Limits};
 use crate::effects::{self, EFFECT_NAMES, contact, elasticity, finite_strain, inertia, viscoelasticity};
 use crate::equilibrium::Solid;
 use adhesion::Pull;
@@ -43,6 +45,8 @@ pub struct Expected {
     pub sliding: Sliding,
     /// How it pulls at the retina's bond.
     pub pull: Pull,
+    /// What the tissue bears before it punctures.
+    pub limits: Limits,
 }
 
 /// Decides for `choice` at `level`; `pressure` is what was decided about it before anything was pressed.
@@ -111,6 +115,10 @@ pub fn decide(
         adhesion::report(choice, level, contact, &expected.pull),
         plain(viscoelasticity::NAME, false, STATIC),
         plain(inertia::NAME, false, STATIC),
+        puncture::report(
+            &expected.limits,
+            &Burden { force_mn: expected.pull.normal_force_mn, strain: expected.strain },
+        ),
     ];
     let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
     let is_on = |name: &str| reports.iter().any(|report| report.name == name && report.simulated);

@@ -351,6 +351,7 @@ fn report(summary: &ContactSummary, max_strain: f64) -> ContactReport {
         max_strain,
         slipping_share: None,
         bond_damage: None,
+        puncture_share: 0.0,
     }
 }
 

@@ -9,6 +9,7 @@ use super::linear::{LinearAnswer, Load, Press, press};
 use super::types::{Control, EffectChoice, EffectReport, Level, PredictError, Request};
 use super::{MAX_DEPTH_SHARE, PUNCTURE_PRESSURE_PER_MODULUS, PreparedScene};
 use crate::effects::finite_strain;
+use crate::effects::puncture::Limits;
 use crate::equilibrium::settled::Settled;
 use crate::equilibrium::{Motion, Solid, Tool};
 use crate::needle::Body;
@@ -173,14 +174,21 @@ impl Question<'_> {
         if let Load::Force(force_mn) = press.load {
             let radius_mm = self.tool.body.radius_mm();
             let pressure_kpa = force_mn / (std::f64::consts::PI * radius_mm * radius_mm);
-            let softest = |low: f64, layer: &crate::tissue::Layer| low.min(layer.youngs_modulus_kpa);
-            let modulus = self.prepared.scene.tissue.retina.iter().fold(f64::INFINITY, softest);
-            let limit_kpa = PUNCTURE_PRESSURE_PER_MODULUS * modulus;
+            let limit_kpa = PUNCTURE_PRESSURE_PER_MODULUS * self.prepared.scene.tissue.softest_retina_kpa();
             if pressure_kpa > limit_kpa {
                 return Err(PredictError::BeyondPuncture { force_mn, radius_mm, pressure_kpa, limit_kpa });
             }
         }
         Ok(())
+    }
+
+    /// What the tissue bears under this needle.
+    pub(crate) fn puncture_limits(&self) -> Limits {
+        let Scene { tissue, puncture, .. } = &self.prepared.scene;
+        Limits {
+            force_mn: puncture.force_mn(self.tool.body.radius_mm(), tissue.softest_retina_kpa()),
+            strain: puncture.max_strain,
+        }
     }
 
     pub(super) fn check_depth(&self, linear: &LinearAnswer) -> Result<(), PredictError> {

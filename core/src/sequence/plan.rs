@@ -158,17 +158,13 @@ pub(super) fn plan<'a>(
     let tissue = &prepared.scene().tissue;
     let pull =
         Pull { normal_force_mn: 0.0, depth_mm: tissue.retina_thickness_mm(), strength_kpa: tissue.bond.strength_kpa };
+    let request = sequence.request(first, &sequence.needle);
+    let question = Question::new(prepared, &request, body, CutOrGrid::Grid(patch.patch()));
+    let (limits, pressure) = (question.puncture_limits(), question.sink().report);
     let mut plan = Plan {
         contacts: Vec::with_capacity(sequence.steps.len()),
-        deepest: Expected { depth_mm: 0.0, strain: 0.0, sliding, pull },
-        pressure: Question::new(
-            prepared,
-            &sequence.request(first, &sequence.needle),
-            body,
-            CutOrGrid::Grid(patch.patch()),
-        )
-        .sink()
-        .report,
+        deepest: Expected { depth_mm: 0.0, strain: 0.0, sliding, pull, limits },
+        pressure,
         fastest_change_s: f64::INFINITY,
     };
     let mut needle = sequence.needle;
@@ -192,7 +188,7 @@ pub(super) fn plan<'a>(
                 let strain = linear.depth_mm / question.yielding_mm();
                 let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
                 let pull = Pull { normal_force_mn: linear.normal_force_mn, ..pull };
-                plan.deepest = Expected { depth_mm: linear.depth_mm, strain, sliding, pull };
+                plan.deepest = Expected { depth_mm: linear.depth_mm, strain, sliding, pull, limits };
             }
         }
         let load = linear.as_ref().map(|linear| (linear.depth_mm, linear.center));

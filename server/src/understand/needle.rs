@@ -5,7 +5,7 @@ use retina_core::needle::shape::{BEVEL_ANGLE, EDGE_FRACTION_OF_RADIUS};
 use retina_core::needle::{Gauge, Needle, NeedleShape, Tip, orientation_pointing};
 use serde_json::json;
 
-use super::{DEFAULT_GAUGE, rotation, unknown_name};
+use super::{DEFAULT_GAUGE, both, rotation, unknown_name};
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::{Quaternion, Vector};
 use crate::wire::request::{BevelledTip, FlatTip, NeedleSpec, TipName, TipShape, TipSpec};
@@ -101,14 +101,4 @@ fn tip_field(field: &str, shape: &NeedleShape) -> String {
         (Some(number), Tip::Bevelled { .. }) => format!("needle.tip.bevelled.{number}"),
         _ => field.to_owned(),
     }
-}
-
-fn both(field: &str, other: &str) -> Problem {
-    Problem::field(
-        Kind::InvalidRequest,
-        field,
-        None,
-        format!("left out when {other} is given"),
-        format!("{field} and {other} exclude each other"),
-    )
 }

@@ -84,6 +84,8 @@ pub struct ContactAnswer {
     /// Largest share of the strength that the retina's bond has lost anywhere, 0 intact to 1 parted; told where `adhesion` is simulated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bond_damage: Option<f64>,
+    /// Force under the needle and strain over the limits of `scene.puncture`, the larger of the two: above 1 the tissue counts as punctured.
+    pub puncture_share: f64,
 }
 
 /// Whether needle and retina touch.
@@ -96,6 +98,8 @@ pub enum ContactWord {
     Touching,
     /// They do, and most of the normal force acts where the tissue slides along the needle.
     Slipping,
+    /// A limit of `scene.puncture` is exceeded, now or in a step before: what is told is the tissue as if it were still whole.
+    Punctured,
 }
 
 /// How accurate the answer is.
@@ -214,6 +218,7 @@ impl From<&ContactReport> for ContactAnswer {
                 ContactState::Clear => ContactWord::Clear,
                 ContactState::Touching => ContactWord::Touching,
                 ContactState::Slipping => ContactWord::Slipping,
+                ContactState::Punctured => ContactWord::Punctured,
             },
             area_mm2: contact.area_mm2,
             max_strain: contact.max_strain,
@@ -221,6 +226,7 @@ impl From<&ContactReport> for ContactAnswer {
             max_penetration_um: contact.max_penetration_mm * 1e3,
             slipping_share: contact.slipping_share,
             bond_damage: contact.bond_damage,
+            puncture_share: contact.puncture_share,
         }
     }
 }
