@@ -6,6 +6,7 @@
 
 mod answer;
 pub mod beds;
+mod bent;
 pub mod budget;
 pub mod calibration;
 pub mod choice;

@@ -1,5 +1,6 @@
 //! What there is to choose from, told from the core's own tables.
 
+use retina_core::needle::shaft::{STIFFNESS, stiffness_mn_per_mm};
 use retina_core::needle::shape::{BEVEL_ANGLE, EDGE_RADIUS, RADIUS};
 use retina_core::needle::{GAUGES, TIP_COORDINATE};
 use retina_core::patch::{NODES_PER_SIDE, SPACING_MM};
@@ -62,6 +63,7 @@ pub fn gauges() -> GaugeList {
         name: gauge.name,
         outer_diameter_mm: gauge.outer_diameter_mm,
         source: gauge.source,
+        stiffness_mn_per_mm: stiffness_mn_per_mm(gauge.radius_mm()),
     });
     GaugeList { default: DEFAULT_GAUGE, gauges: gauges.into() }
 }
@@ -147,6 +149,7 @@ fn parameters() -> Vec<ParameterEntry> {
         ("accuracy.max_time_ms", &MAX_TIME),
         ("needle.tip_mm", &TIP_COORDINATE),
         ("needle.radius_mm", &RADIUS),
+        ("needle.stiffness_mn_per_mm", &STIFFNESS),
         ("needle.tip.flat.edge_radius_mm", &EDGE_RADIUS),
         ("needle.tip.bevelled.edge_radius_mm", &EDGE_RADIUS),
         ("needle.tip.bevelled.angle_deg", &BEVEL_ANGLE),

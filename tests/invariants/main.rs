@@ -14,4 +14,5 @@ mod repeatability;
 mod sequences;
 mod shape;
 mod support;
+mod tool_flex;
 mod zeros;

@@ -6,6 +6,7 @@
 mod adhesion;
 mod friction;
 mod pressure;
+mod tool_flex;
 
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use retina_core::effect::{Effect, Local, Stencils};
@@ -39,7 +40,7 @@ const SIZES: [f64; 3] = [1.0, 1e-3, 1e3];
 const REPEATS: usize = 4;
 
 /// The rows of the derivative check: each runs [`check_effect`] on its effect.
-const ROWS: [(&str, fn()); 8] = [
+const ROWS: [(&str, fn()); 9] = [
     ("elasticity", check_elasticity),
     ("finite_strain", check_finite_strain),
     ("contact", check_contact),
@@ -48,6 +49,7 @@ const ROWS: [(&str, fn()); 8] = [
     ("adhesion", adhesion::check),
     ("viscoelasticity", check_viscoelasticity),
     ("inertia", check_inertia),
+    ("tool_flex", tool_flex::check),
 ];
 
 fn largest(values: &[f64]) -> f64 {

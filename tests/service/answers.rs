@@ -101,6 +101,26 @@ fn a_listed_scene_can_be_sent_back_as_it_stands() {
 }
 
 #[test]
+fn a_leaning_needle_bends_by_its_stiffness() {
+    let leaning = json!({
+        "needle": {"tip_mm": [0, 0, 0], "direction": [0.5, 0, -0.8], "gauge": "27G"}, "force_mn": [0.25, 0, -0.4],
+    });
+    let bent = answered(predict(&leaning));
+    assert_matches("PredictResponse", &bent);
+    let length = |vector: &Value| numbers(vector).iter().map(|x| x * x).sum::<f64>().sqrt();
+    // Reaction along the motion 0.472 mN, across it 0.472 tan(32 degrees) = 0.295 mN, over 32 mN/mm.
+    assert!((length(&bent["needle"]["deflection_mm"]) - 0.0092).abs() < 0.0006, "{}", bent["needle"]);
+    let stated = answered(predict(&with(leaning.clone(), "/needle/stiffness_mn_per_mm", json!(32))));
+    assert_eq!(timeless(stated), timeless(bent.clone()), "that is the default of 27G");
+    let softer = answered(predict(&with(leaning.clone(), "/needle/stiffness_mn_per_mm", json!(16))));
+    let ratio = length(&softer["needle"]["deflection_mm"]) / length(&bent["needle"]["deflection_mm"]);
+    assert!((ratio - 2.0).abs() < 0.1, "{ratio}");
+    let rigid = answered(predict(&with(leaning, "/needle/stiffness_mn_per_mm", json!(1e6))));
+    assert_eq!(rigid["needle"].get("deflection_mm"), None);
+    assert!(timeless(rigid) != timeless(bent));
+}
+
+#[test]
 fn puncture_is_always_told() {
     let row = |answer: &Value| {
         let effects = answer["effects"].as_array().expect("effects");

@@ -46,6 +46,7 @@ fn values_out_of_range() {
         ("/needle/tip_mm", json!([0, 2000, 0]), "needle.tip_mm[1]", "-1000 to 1000 mm"),
         ("/needle/tip", json!({"bevelled": {"angle_deg": 90}}), "needle.tip.bevelled.angle_deg", "15 to 75 deg"),
         ("/needle/tip", json!({"flat": {"edge_radius_mm": 1}}), "needle.tip.flat.edge_radius_mm", "0.0001 to 0.257 mm"),
+        ("/needle/stiffness_mn_per_mm", json!(0), "needle.stiffness_mn_per_mm", "1 to 1000000 mN/mm"),
         ("/force_mn", json!([0, 0, -101]), "force_mn", "length 0 to 100 mN"),
         ("/force_mn", json!([0, 0, -1e300]), "force_mn", "length 0 to 100 mN"),
         ("/scene", json!({"surface": {"kind": "sphere", "radius_mm": -12}}), "scene.surface.radius_mm", "8 to 20 mm"),

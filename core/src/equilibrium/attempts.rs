@@ -100,19 +100,14 @@ impl Wall<'_> {
         progress: &mut dyn Progress,
     ) -> Result<Equilibrium, NewtonError> {
         let Load { motion, touch_mm, .. } = *load;
-        let direction = motion.direction.into_inner();
         let softened = self.contact.softened();
         let mut total = NewtonReport::default();
         for step in 1..=attempt.load_steps {
             let share = step as f64 / attempt.load_steps as f64;
-            let drive = match motion.force_mn {
-                Some(force_mn) => Drive::Force { direction, force_mn: share * force_mn },
-                None => {
-                    let travel_mm = touch_mm + share * (motion.travel_mm - touch_mm);
-                    self.place_tip(&mut positions, &(direction * travel_mm));
-                    Drive::Held
-                }
-            };
+            if motion.force_mn.is_none() {
+                self.hold_at(&mut positions, motion, touch_mm + share * (motion.travel_mm - touch_mm));
+            }
+            let drive = self.drive(motion, share);
             if self.contact.softening > 1.0 {
                 let drive = (drive, SOFTENED_TOLERANCE);
                 total += self.newton(&softened, drive, load, attempt, &mut positions, spent, workspace, progress)?;
@@ -141,8 +136,10 @@ impl Wall<'_> {
     ) -> Result<NewtonReport, NewtonError> {
         let solid = self.solid();
         let contact = self.contact_with(contact);
+        let flex = self.flex(load.motion);
         let mut terms =
             vec![self.topology.term(Place::Elements, solid.as_ref()), self.topology.term(Place::Faces, &contact)];
+        terms.extend(flex.iter().map(|flex| self.topology.term(Place::Tip, flex)));
         terms.extend(load.additions.iter().map(|addition| self.topology.term(addition.place, addition.effect)));
         let system = System {
             terms: &terms,
@@ -175,8 +172,11 @@ impl Wall<'_> {
         load_steps: usize,
         workspace: &Workspace,
     ) -> Equilibrium {
+        let (travel_mm, deflection) = self.ended(&positions, motion);
         let tip = Vector3::from_row_slice(&positions[3 * self.topology.needle()..]);
-        let travel_mm = (tip - self.tool.patch_from_needle.translation.vector).dot(&motion.direction);
-        Equilibrium { positions, travel_mm, reaction_mn: -holding_force(workspace), newton, load_steps }
+        // What holds the tip is the guide and, where it bends, the shaft.
+        let shaft = self.flex(motion).map_or_else(Vector3::zeros, |flex| flex.force_on_guide(&tip));
+        let reaction_mn = shaft - holding_force(workspace);
+        Equilibrium { positions, travel_mm, deflection, reaction_mn, newton, load_steps }
     }
 }

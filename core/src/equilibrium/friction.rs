@@ -15,7 +15,7 @@ use crate::effect::{Effect, Local};
 use crate::effects::friction::{Friction, RubbingPoint, anchor};
 use crate::mesh::wall::Place;
 use crate::progress::Progress;
-use crate::solve::newton::{Drive, NewtonError, NewtonReport, Workspace};
+use crate::solve::newton::{NewtonError, NewtonReport, Workspace};
 
 /// Slip from which on friction is at its limit (mm): what sticks creeps by less, a fraction of what the levels resolve.
 pub const FULL_SLIP_MM: f64 = 5e-4;
@@ -163,10 +163,7 @@ impl Wall<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<NewtonReport, NewtonError> {
-        let drive = match load.motion.force_mn {
-            Some(force_mn) => Drive::Force { direction: load.motion.direction.into_inner(), force_mn },
-            None => Drive::Held,
-        };
+        let drive = self.drive(load.motion, 1.0);
         let mut spent = 0;
         let mut failure = NewtonError::Interrupted { iterations: 0 };
         for attempt in [&ATTEMPTS[0], &ATTEMPTS[ATTEMPTS.len() - 1]] {

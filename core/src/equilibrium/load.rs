@@ -59,6 +59,8 @@ pub struct Tool<'a> {
     pub body: &'a Body,
     /// Its pose before it moves.
     pub patch_from_needle: Isometry3<f64>,
+    /// Force for a deflection of its tip across the shaft (mN/mm); `None`: the shaft does not bend.
+    pub stiffness_mn_per_mm: Option<f64>,
 }
 
 /// How the needle is driven.
@@ -99,6 +101,8 @@ pub struct Equilibrium {
     pub positions: Vec<f64>,
     /// Travel of the needle from its given pose (mm).
     pub travel_mm: f64,
+    /// How far the tip stands aside of a rigid needle's (mm), where the shaft bends.
+    pub deflection: Option<Vector3<f64>>,
     /// Force of the tissue on the needle (mN).
     pub reaction_mn: Vector3<f64>,
     /// Cost of all load steps together.

@@ -2,9 +2,8 @@
 
 use nalgebra::{Unit, Vector3};
 
-use super::choice::{Decision, Expected, decide, pressure};
+use super::choice::{Decision, Expected, decide, pressure, tool_flex};
 use super::expected_error::Situation;
-use super::finite_element::ContactEstimate;
 use super::linear::{LinearAnswer, Load, Press, press};
 use super::types::{Control, EffectChoice, EffectReport, Level, PredictError, Request};
 use super::{MAX_DEPTH_SHARE, PUNCTURE_PRESSURE_PER_MODULUS, PreparedScene};
@@ -55,7 +54,7 @@ impl<'a> Question<'a> {
                 Motion { direction: patch_from_needle.rotation * -Vector3::z_axis(), force_mn: None, travel_mm: 0.0 }
             }
         };
-        Question { prepared, request, patch, tool: Tool { body, patch_from_needle }, motion }
+        Question { prepared, request, patch, tool: Tool { body, patch_from_needle, stiffness_mn_per_mm: None }, motion }
     }
 }
 
@@ -107,7 +106,11 @@ impl Question<'_> {
     }
 
     pub(crate) fn situation_under(&self, linear: &LinearAnswer) -> Situation {
-        self.situation(linear.depth_mm, linear.depth_mm / self.yielding_mm(), Some(&linear.press))
+        let mut situation = self.situation(linear.depth_mm, linear.depth_mm / self.yielding_mm(), Some(&linear.press));
+        // Needles were sampled with rigid shafts.
+        let bending = self.bending(Some(linear));
+        situation.sampled &= !tool_flex::report(&self.request.effects, Level::Coarse, true, &bending).simulated;
+        situation
     }
 
     pub(super) fn situation(&self, depth_mm: f64, strain: f64, press: Option<&Press>) -> Situation {
@@ -197,14 +200,5 @@ impl Question<'_> {
         let limit_mm = MAX_DEPTH_SHARE * (self.yielding_mm() - thinning_mm);
         let depth_mm = linear.depth_mm;
         if depth_mm > limit_mm { Err(PredictError::TooDeep { depth_mm, limit_mm }) } else { Ok(()) }
-    }
-
-    pub(crate) fn estimate(&self, linear: &LinearAnswer) -> ContactEstimate {
-        ContactEstimate {
-            center: linear.center,
-            radius_mm: linear.contact_radius_mm,
-            touch_mm: linear.press.touch.travel_mm,
-            travel_mm: linear.travel_mm(),
-        }
     }
 }

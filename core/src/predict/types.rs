@@ -86,10 +86,12 @@ pub enum ContactState {
 /// Where the needle ends up and what holds it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NeedleOutcome {
-    /// Foremost point (mm).
+    /// Foremost point, the deflection included (mm).
     pub tip_mm: Point3<f64>,
     /// Advance along the force from where it was given (mm); zero under pose control.
     pub travel_mm: f64,
+    /// How far the tip stands aside of a rigid needle's (mm), where the shaft's bending is simulated.
+    pub deflection_mm: Option<Vector3<f64>>,
     /// Force of the tissue on the needle (mN).
     pub reaction_mn: Vector3<f64>,
 }

@@ -54,7 +54,8 @@ impl Simulation<'_> {
             (question.at_rest(self.decision.clone(), None, why), false)
         };
         self.remember_puncture(&mut prediction, step.time_s);
-        self.needle.tip_mm = prediction.needle.tip_mm;
+        // What is handed on is the guide's place, where a needle without a load would be.
+        self.needle.tip_mm = prediction.needle.tip_mm - prediction.needle.deflection_mm.unwrap_or_default();
         self.needle.orientation = request.needle.orientation;
         Ok((prediction, laid))
     }
@@ -88,7 +89,7 @@ impl Simulation<'_> {
         problem: &Problem,
         progress: &mut dyn Progress,
     ) -> Result<Aim, PredictError> {
-        let contact = linear.map(|linear| question.estimate(linear));
+        let contact = linear.map(|linear| question.estimate(linear, self.decision.tool_flex));
         let remembers = self.rates.any();
         let fitting = |mesh: &ContactEstimate| contact.as_ref().is_none_or(|contact| fits(mesh, contact));
         let kept = self.laid.clone().filter(|laid| remembers || self.unmoved(question) || fitting(&laid.contact));
@@ -141,10 +142,11 @@ impl Simulation<'_> {
             }
         };
         let mut expected = match linear {
-            Some(linear) => wall.displaced(&question.start(linear)),
+            Some(linear) => wall.displaced(&question.start(linear, self.decision.tool_flex)),
             None => wall.start(),
         };
-        wall.place_tip(&mut expected, &(motion.direction.into_inner() * motion.travel_mm));
+        let deflection = aim.contact.map_or_else(Vector3::zeros, |contact| contact.deflection);
+        wall.place_tip(&mut expected, &(motion.direction.into_inner() * motion.travel_mm + deflection));
         let start = self.start(&expected, &motion, self.unmoved(question));
         progress.stage("equilibrium");
         let level = question.request.level.name();
@@ -162,7 +164,7 @@ impl Simulation<'_> {
         progress.stage("surface");
         let mut answer = problem.answer(&wall, self.resolution, &equilibrium, touch_mm);
         if withdrawn {
-            answer.travel_mm = 0.0;
+            (answer.travel_mm, answer.deflection) = (0.0, None);
         } else {
             answer = question.with_node_penetration(answer);
         }
@@ -200,4 +202,10 @@ impl Simulation<'_> {
 }
 
 /// Stands for a contact where there is none: the mesh is then laid around the patch's centre.
-const NO_CONTACT: ContactEstimate = ContactEstimate { center: [0.0; 2], radius_mm: 0.1, touch_mm: 0.0, travel_mm: 0.0 };
+const NO_CONTACT: ContactEstimate = ContactEstimate {
+    center: [0.0; 2],
+    radius_mm: 0.1,
+    touch_mm: 0.0,
+    travel_mm: 0.0,
+    deflection: Vector3::new(0.0, 0.0, 0.0),
+};

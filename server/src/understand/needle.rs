@@ -1,6 +1,7 @@
 //! The needle of a request.
 
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
+use retina_core::needle::shaft::stiffness_mn_per_mm;
 use retina_core::needle::shape::{BEVEL_ANGLE, EDGE_FRACTION_OF_RADIUS};
 use retina_core::needle::{Gauge, Needle, NeedleShape, Tip, orientation_pointing};
 use serde_json::json;
@@ -20,7 +21,8 @@ pub(super) fn needle(spec: &NeedleSpec) -> Result<Needle, Problem> {
     let tip_mm = Point3::from(spec.tip_mm.0);
     let orientation = orientation("needle", spec.orientation_xyzw.as_ref(), spec.direction.as_ref())?
         .unwrap_or_else(|| orientation_pointing(&-Vector3::z_axis()));
-    let needle = Needle { shape, tip_mm, orientation };
+    let stiffness = spec.stiffness_mn_per_mm.unwrap_or_else(|| stiffness_mn_per_mm(radius_mm));
+    let needle = Needle { shape, tip_mm, orientation, stiffness_mn_per_mm: Some(stiffness) };
     needle.validate().map_err(|error| from_out_of_range(tip_field(&error.field, &shape), &error))?;
     Ok(needle)
 }

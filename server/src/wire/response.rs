@@ -57,10 +57,13 @@ pub struct SurfaceAnswer<'a> {
 /// The needle at equilibrium.
 #[derive(Serialize, ToSchema)]
 pub struct NeedleAnswer {
-    /// Foremost point, scene frame, mm.
+    /// Foremost point, scene frame, mm; the deflection is in it.
     pub tip_mm: Vector,
     /// Advance along the force from where the needle was given, mm; zero under pose control.
     pub travel_mm: f64,
+    /// How far the tip stands aside of where a rigid needle's would, scene frame, mm; told where `tool_flex` is simulated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deflection_mm: Option<Vector>,
     /// Force of the tissue on the needle, scene frame, mN.
     pub reaction_mn: Vector,
 }
@@ -206,6 +209,7 @@ impl From<&NeedleOutcome> for NeedleAnswer {
         Self {
             tip_mm: Vector(needle.tip_mm.coords.into()),
             travel_mm: needle.travel_mm,
+            deflection_mm: needle.deflection_mm.map(|deflection| Vector(deflection.into())),
             reaction_mn: Vector(needle.reaction_mn.into()),
         }
     }
