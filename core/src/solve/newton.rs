@@ -1,8 +1,8 @@
 //! Newton's method for the free unknowns and at most one driven vertex.
 //!
 //! Sought is a stationary point of Π(x, s) = Σ energies − F s over the free positions x and, under force control, the travel s of the
-//! driven vertex along a unit direction d. Each step factorises the Hessian of the free part; the travel is eliminated by the bordering
-//! method (two right-hand sides, one factor). Where the Hessian is not positive definite it is changed until it is, and only then
+//! driven vertex along a unit direction d; it may have more freedom ([`Drive`]). Each step factorises the Hessian of the free part; the driven vertex is eliminated by the bordering
+//! method (`border.rs`: one factor, a right-hand side more for each direction). Where the Hessian is not positive definite it is changed until it is, and only then
 //! (projecting always would cost the quadratic convergence of nearly incompressible elements).
 //!
 //! Near the end the Hessian hardly changes any more: there the last factor is used again for as long as it pays (chord steps), at a fraction of the cost
@@ -17,26 +17,14 @@ use std::ops::AddAssign;
 use nalgebra::Vector3;
 use thiserror::Error;
 
+pub use super::border::Drive;
+use super::border::Reduced;
 pub use super::globalization::Globalization;
 use super::globalization::{Step, Trial};
 use super::sparse::{Factor, LinearSolveError, SymbolicFactor, norm};
 use crate::assemble::{Dofs, Pattern, Scratch, energy, gradient};
 use crate::effect::Term;
 use crate::progress::Progress;
-
-/// How the driven vertex moves.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Drive {
-    /// It stays where it is.
-    Held,
-    /// It moves along the unit vector `direction` until the resisting force along it equals `force_mn`.
-    Force {
-        /// Unit direction of travel.
-        direction: Vector3<f64>,
-        /// Force along it (mN).
-        force_mn: f64,
-    },
-}
 
 /// How to solve and when to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -178,9 +166,8 @@ impl Workspace {
 impl System<'_> {
     pub(super) fn potential(&self, positions: &[f64], start: &[f64], drive: Drive, scratch: &mut Scratch) -> f64 {
         let mut total = energy(self.terms, positions, scratch);
-        if let (Drive::Force { direction, force_mn }, Some(vertex)) = (drive, self.driven) {
-            let travel: f64 = (0..3).map(|k| (positions[3 * vertex + k] - start[3 * vertex + k]) * direction[k]).sum();
-            total -= force_mn * travel;
+        if let Some(vertex) = self.driven {
+            total -= drive.work(&Vector3::from_fn(|k, _| positions[3 * vertex + k] - start[3 * vertex + k]));
         }
         if !self.dead_load.is_empty() {
             for at in 0..positions.len() {
@@ -200,13 +187,8 @@ impl System<'_> {
         for (r, load) in workspace.residual.iter_mut().zip(self.dead_load) {
             *r -= load;
         }
-        let along = match drive {
-            Drive::Held => 0.0,
-            Drive::Force { direction, force_mn } => {
-                Vector3::from_row_slice(&workspace.residual[free..]).dot(&direction) - force_mn
-            }
-        };
-        norm(&workspace.residual[..free]).hypot(along)
+        let along = drive.out_of_balance(&Vector3::from_row_slice(&workspace.residual[free..]));
+        along.into_iter().fold(norm(&workspace.residual[..free]), f64::hypot)
     }
 
     /// Solves for equilibrium from `positions`, which hold the answer on success.
@@ -291,43 +273,40 @@ impl System<'_> {
     ) -> Result<(Vec<f64>, f64), NewtonError> {
         let free = self.dofs.free;
         let residual = &workspace.residual;
-        let mut step: Vec<f64> = residual[..free].iter().map(|r| -r).collect();
-        let mut travel = 0.0;
-        let mut out_of_balance = 0.0;
-        match drive {
-            Drive::Held => {
-                workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut step)?;
-            }
-            Drive::Force { direction, force_mn } => {
-                let stored = self.pattern.stored();
-                let border = &workspace.values[stored..];
-                let coupling: Vec<f64> =
-                    (0..free).map(|i| (0..3).map(|k| border[k * free + i] * direction[k]).sum()).collect();
-                let corner = &border[3 * free..];
+        let directions: Vec<Vector3<f64>> = drive.directions().into_iter().map(|(direction, _)| direction).collect();
+        let out_of_balance = drive.out_of_balance(&Vector3::from_row_slice(&residual[free..]));
+        let border = &workspace.values[self.pattern.stored()..];
+        let corner = &border[3 * free..];
+        let mut columns: Vec<f64> = residual[..free].iter().map(|r| -r).collect();
+        for direction in &directions {
+            columns.extend((0..free).map(|i| (0..3).map(|k| border[k * free + i] * direction[k]).sum::<f64>()));
+        }
+        let couplings = columns[free..].to_vec();
+        let coupling = |direction: usize| &couplings[direction * free..(direction + 1) * free];
+        workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut columns)?;
+        let (alone, responses) = columns.split_at(free);
+        let response = |direction: usize| &responses[direction * free..(direction + 1) * free];
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let mut reduced = Reduced { directions: &directions, stiffness: Vec::new(), drive: Vec::new() };
+        for (row, along) in directions.iter().enumerate() {
+            for (column, other) in directions.iter().enumerate() {
                 let own: f64 = (0..3)
                     .flat_map(|i| (0..3).map(move |j| (i, j)))
-                    .map(|(i, j)| direction[i] * direction[j] * corner[3 * i.max(j) + i.min(j)])
+                    .map(|(i, j)| along[i] * other[j] * corner[3 * i.max(j) + i.min(j)])
                     .sum();
-                out_of_balance = Vector3::from_row_slice(&residual[free..]).dot(&direction) - force_mn;
-                let mut columns = step;
-                columns.extend_from_slice(&coupling);
-                workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut columns)?;
-                let (alone, response) = columns.split_at(free);
-                let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-                let stiffness = own - dot(&coupling, response);
-                let drive = -out_of_balance - dot(&coupling, alone);
-                // Without stiffness (no contact yet, or past a limit point) only the sign of the drive is known.
-                travel = if stiffness > 0.0 { drive / stiffness } else { drive.signum() * max_travel_mm };
-                travel = travel.clamp(-max_travel_mm, max_travel_mm);
-                step = alone.iter().zip(response).map(|(a, r)| a - travel * r).collect();
+                reduced.stiffness.push(own - dot(coupling(row), response(column)));
             }
+            reduced.drive.push(-out_of_balance[row] - dot(coupling(row), alone));
+        }
+        let travels = reduced.solve(max_travel_mm);
+        let mut step = alone.to_vec();
+        for (direction, travel) in travels.iter().enumerate() {
+            step.iter_mut().zip(response(direction)).for_each(|(s, r)| *s -= travel * r);
         }
         let slope =
-            step.iter().zip(&workspace.residual[..free]).map(|(s, r)| s * r).sum::<f64>() + travel * out_of_balance;
-        match drive {
-            Drive::Held => step.extend_from_slice(&[0.0; 3]),
-            Drive::Force { direction, .. } => step.extend((direction * travel).iter()),
-        }
+            step.iter().zip(&residual[..free]).map(|(s, r)| s * r).sum::<f64>() + dot(&travels, &out_of_balance);
+        let moved: Vector3<f64> = directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
+        step.extend(moved.iter());
         Ok((step, slope.min(0.0)))
     }
 
