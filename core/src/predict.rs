@@ -33,7 +33,7 @@ use crate::solve::newton;
 use beds::Beds;
 use budget::{Budget, Choice, LevelTimes};
 use expected_error::Situation;
-use finite_element::{REFERENCE, Resolution};
+use finite_element::{COARSE, REFERENCE, Resolution};
 use linear::press;
 use question::Begun;
 pub(crate) use question::{CutOrGrid, Question};
@@ -100,10 +100,11 @@ impl PreparedScene {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<Prediction, PredictError> {
-        self.predict_at(request, &REFERENCE, workspace, progress)
+        let resolution = if request.level == Level::Coarse { &COARSE } else { &REFERENCE };
+        self.predict_at(request, resolution, workspace, progress)
     }
 
-    /// As [`PreparedScene::predict`], with `resolution` in place of that of level `reference`: for measuring what refinement changes.
+    /// As [`PreparedScene::predict`], with `resolution` in place of that of the request's finite-element level: for measuring what a setting changes.
     ///
     /// # Errors
     /// [`PredictError`].

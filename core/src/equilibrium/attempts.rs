@@ -19,9 +19,7 @@ pub(super) struct Attempt {
     max_iterations: usize,
 }
 
-/// Residual relative to the force scale at which Newton stops.
-pub(super) const RELATIVE_TOLERANCE: f64 = 1e-7;
-/// The same in the first solve of a softened contact.
+/// Residual relative to the force scale at which the first solve of a softened contact stops.
 const SOFTENED_TOLERANCE: f64 = 1e-3;
 /// Force scale under pose control (mN): that of a light touch.
 const POSE_FORCE_SCALE_MN: f64 = 0.01;
@@ -113,7 +111,7 @@ impl Wall<'_> {
                 total += self.newton(&softened, drive, load, attempt, &mut positions, spent, workspace, progress)?;
             }
             if self.contact.softening <= 1.0 || step == attempt.load_steps {
-                let drive = (drive, RELATIVE_TOLERANCE);
+                let drive = (drive, self.contact.tolerance);
                 total +=
                     self.newton(&self.contact, drive, load, attempt, &mut positions, spent, workspace, progress)?;
             }

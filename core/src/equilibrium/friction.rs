@@ -9,7 +9,7 @@
 use nalgebra::{Point3, Vector3};
 use thiserror::Error;
 
-use super::attempts::{ATTEMPTS, RELATIVE_TOLERANCE};
+use super::attempts::ATTEMPTS;
 use super::{Addition, Equilibrium, Load, Wall};
 use crate::effect::{Effect, Local};
 use crate::effects::friction::{Friction, RubbingPoint, anchor};
@@ -119,8 +119,8 @@ impl Wall<'_> {
             total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
             let mut now = self.pressed(&found.positions);
             change = now.change_from(&pressed);
-            if settling && change <= SETTLED && tolerance > RELATIVE_TOLERANCE {
-                tolerance = RELATIVE_TOLERANCE;
+            if settling && change <= SETTLED && tolerance > self.contact.tolerance {
+                tolerance = self.contact.tolerance;
                 total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
                 now = self.pressed(&found.positions);
                 change = now.change_from(&pressed);

@@ -17,7 +17,7 @@ pub enum Solid {
     FiniteStrain,
 }
 
-/// Numerical parameters of the contact.
+/// Numerical parameters of the contact and of its solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSettings {
     /// Penalty stiffness (kPa/mm).
@@ -29,6 +29,8 @@ pub struct ContactSettings {
     /// A first solve with this many times less stiffness and more smoothing leads to the contact proper; 1: none is needed. A stiff contact
     /// on a fine mesh finds its points one by one, a soft one all at once.
     pub softening: f64,
+    /// Residual relative to the force scale at which Newton stops.
+    pub tolerance: f64,
 }
 
 impl ContactSettings {

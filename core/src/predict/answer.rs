@@ -65,7 +65,7 @@ impl Question<'_> {
         }
         let answer = match self.request.level {
             Level::Linear => self.linear(&linear, strain, &sink),
-            Level::Coarse => self.coarse(&linear, &decision, sink.change_kpa, workspace, progress)?,
+            Level::Coarse => self.coarse(resolution, &linear, &decision, sink.change_kpa, workspace, progress)?,
             Level::Reference => self.fine(resolution, &linear, &decision, sink.change_kpa, workspace, progress)?,
         };
         let expected = self.situation_under(&linear).expected_error(self.request.level);
@@ -150,13 +150,14 @@ impl Question<'_> {
 
     pub(crate) fn coarse(
         &self,
+        resolution: &Resolution,
         linear: &LinearAnswer,
         decision: &Decision,
         change_kpa: Option<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
-        let topology = shared_topology(COARSE.division(&self.prepared.scene.tissue, decision.adhesion))?;
+        let topology = shared_topology(resolution.division(&self.prepared.scene.tissue, decision.adhesion))?;
         let (_, solver) = match &mut workspace.coarse {
             Some(kept) if Arc::ptr_eq(&kept.0, &topology) => kept,
             slot => {
@@ -164,8 +165,7 @@ impl Question<'_> {
                 slot.insert((topology.clone(), memory))
             }
         };
-        let mut bench =
-            Bench { level: Level::Coarse.name(), resolution: &COARSE, topology: &topology, workspace: solver };
+        let mut bench = Bench { level: Level::Coarse.name(), resolution, topology: &topology, workspace: solver };
         let start = self.start(linear, decision.tool_flex);
         let estimate = self.estimate(linear, decision.tool_flex);
         self.problem(decision, change_kpa).solve(&mut bench, &estimate, &start, progress)
@@ -181,7 +181,7 @@ impl Question<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
-        let coarse = self.coarse(linear, decision, change_kpa, workspace, progress)?;
+        let coarse = self.coarse(&COARSE, linear, decision, change_kpa, workspace, progress)?;
         let topology = shared_topology(resolution.division(&self.prepared.scene.tissue, decision.adhesion))?;
         let mut solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
         let mut bench =

@@ -40,6 +40,10 @@ pub struct Resolution {
     pub contact: ContactSettings,
 }
 
+/// Residual relative to the force scale at which Newton's method stops at both levels: far below what a mesh can feel, and the chord steps that reach it
+/// cost little.
+const TOLERANCE: f64 = 1e-7;
+
 /// Level `coarse`.
 pub const COARSE: Resolution = Resolution {
     core_cells: 1,
@@ -49,7 +53,13 @@ pub const COARSE: Resolution = Resolution {
     sclera_elements: 0,
     core_per_contact: 0.8,
     rim_mm: 1.5,
-    contact: ContactSettings { stiffness_kpa_per_mm: 4e4, smoothing_mm: 2e-3, points_per_edge: 5, softening: 1.0 },
+    contact: ContactSettings {
+        stiffness_kpa_per_mm: 4e4,
+        smoothing_mm: 2e-3,
+        points_per_edge: 5,
+        softening: 1.0,
+        tolerance: TOLERANCE,
+    },
 };
 
 /// Level `reference`.
@@ -61,7 +71,13 @@ pub const REFERENCE: Resolution = Resolution {
     sclera_elements: 1,
     core_per_contact: 1.0,
     rim_mm: 2.0,
-    contact: ContactSettings { stiffness_kpa_per_mm: 3e5, smoothing_mm: 2e-4, points_per_edge: 4, softening: 10.0 },
+    contact: ContactSettings {
+        stiffness_kpa_per_mm: 3e5,
+        smoothing_mm: 2e-4,
+        points_per_edge: 4,
+        softening: 10.0,
+        tolerance: TOLERANCE,
+    },
 };
 
 impl Resolution {

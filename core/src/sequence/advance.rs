@@ -10,7 +10,7 @@ use super::plan::{fits, outside, pressed};
 use super::{Laid, Settled, Simulation, Step};
 use crate::equilibrium::{Load, MeshSize, Motion};
 use crate::predict::expected_error::ExpectedError;
-use crate::predict::finite_element::{ContactEstimate, Problem};
+use crate::predict::finite_element::{COARSE, ContactEstimate, Problem};
 use crate::predict::linear::LinearAnswer;
 use crate::predict::{ContactState, CutOrGrid, Level, PredictError, Prediction, Question};
 use crate::progress::Progress;
@@ -103,7 +103,8 @@ impl Simulation<'_> {
                 };
                 if let (Level::Reference, Some(linear)) = (question.request.level, linear.filter(|_| !remembers)) {
                     // The finer mesh is made for the contact that `coarse` finds, as in a single prediction.
-                    let found = question.coarse(linear, &self.decision, None, &mut self.coarse, progress)?.estimate;
+                    let found =
+                        question.coarse(&COARSE, linear, &self.decision, None, &mut self.coarse, progress)?.estimate;
                     around = ContactEstimate { center: found.center, radius_mm: found.radius_mm, ..around };
                 }
                 self.settled = None;

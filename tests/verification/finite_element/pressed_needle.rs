@@ -53,7 +53,13 @@ impl Press {
             disc: DiscGeometry { center: [0.0; 2], radii: radii.to_vec() },
             shape: NeedleShape::hemispherical(radius_mm),
             solid,
-            contact: ContactSettings { stiffness_kpa_per_mm: 1e6, smoothing_mm, points_per_edge: 3, softening: 1.0 },
+            contact: ContactSettings {
+                stiffness_kpa_per_mm: 1e6,
+                smoothing_mm,
+                points_per_edge: 3,
+                softening: 1.0,
+                tolerance: 1e-7,
+            },
         }
     }
 
