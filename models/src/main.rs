@@ -6,11 +6,12 @@ use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
 use indicatif::ProgressBar;
-use retina_models::dataset::DatasetError;
+use retina_core::scene::Scene;
 use retina_models::dataset::manifest::Manifest;
 use retina_models::dataset::report::report;
 use retina_models::dataset::run::{Order, Summary, generate};
-use retina_models::sample::Sample;
+use retina_models::dataset::{DatasetError, deformcontact, truth};
+use retina_models::sample::{Sample, Split};
 use retina_models::shard;
 
 /// Data, training and evaluation of the learned retina patch.
@@ -25,6 +26,30 @@ struct Arguments {
 enum Command {
     /// Makes samples of random indentation paths; the same command again goes on where it stopped.
     Dataset(Dataset),
+    /// Measures how far the truth of the samples is from level `reference`, on random paths.
+    TruthError {
+        /// Number of paths.
+        #[arg(long, default_value_t = 20)]
+        paths: u32,
+        /// Seed of the paths.
+        #[arg(long, default_value_t = 77)]
+        seed: u64,
+    },
+    /// Writes a data set in the layout that the public DeformContact code reads.
+    ExportDeformcontact {
+        /// The data set's folder.
+        folder: PathBuf,
+        /// The folder to write to.
+        out: PathBuf,
+        /// Splits to write.
+        #[arg(long, value_delimiter = ',', default_value = "train,validation")]
+        splits: Vec<String>,
+    },
+    /// Reads that layout back and says what is there.
+    ImportDeformcontact {
+        /// A folder with an `InitialMesh.ply`.
+        folder: PathBuf,
+    },
     /// Prints how far the surface moves in a data set, and how far off the cheap answers are.
     DatasetReport {
         /// The data set's folder.
@@ -54,6 +79,13 @@ struct Dataset {
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Dataset(arguments) => dataset(&arguments),
+        Command::TruthError { paths, seed } => truth_error(paths, seed),
+        Command::ExportDeformcontact { folder, out, splits } => export(&folder, &out, &splits),
+        Command::ImportDeformcontact { folder } => deformcontact::import(&folder).map(|samples| {
+            let forces = samples.iter().map(|sample| sample.force_mn);
+            let largest = forces.fold(0.0_f32, f32::max);
+            println!("{} samples, largest force {largest} mN", samples.len());
+        }),
         Command::DatasetReport { folder } => samples(&folder).map(|samples| print!("{}", report(&samples))),
     };
     match result {
@@ -82,6 +114,31 @@ fn dataset(arguments: &Dataset) -> Result<(), DatasetError> {
         println!("- {paths} paths ended early: {cause}");
     }
     println!("\n{}", report(&samples(&arguments.out)?));
+    Ok(())
+}
+
+fn truth_error(paths: u32, seed: u64) -> Result<(), DatasetError> {
+    let scenes: Vec<u8> = (0..Scene::built_in_names().len() as u8).collect();
+    let bar = ProgressBar::new(u64::from(paths));
+    let mut comparisons = Vec::new();
+    for path in 0..paths {
+        comparisons.extend(truth::compare(seed, path, &scenes)?);
+        bar.inc(1);
+    }
+    bar.finish();
+    println!("truth `{}` against level `reference`, {paths} paths, seed {seed}\n", truth::NAME);
+    print!("{}", truth::table(&comparisons));
+    Ok(())
+}
+
+fn export(folder: &Path, out: &Path, splits: &[String]) -> Result<(), DatasetError> {
+    let known = Split::ALL.map(Split::name);
+    if let Some(unknown) = splits.iter().find(|name| !known.contains(&name.as_str())) {
+        return Err(DatasetError::Value { field: "splits", value: unknown.clone(), allowed: known.join(", ") });
+    }
+    let mut samples = samples(folder)?;
+    samples.retain(|sample| splits.iter().any(|name| name == sample.split.name()));
+    println!("{} samples written to {}", deformcontact::export(&samples, out)?, out.display());
     Ok(())
 }
 

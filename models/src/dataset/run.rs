@@ -8,7 +8,6 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use retina_core::needle::Tip;
 use retina_core::predict::PreparedScene;
 use retina_core::predict::finite_element::Resolution;
 use retina_core::scene::Scene;
@@ -37,14 +36,14 @@ pub struct Order {
     pub seed: u64,
     /// Threads.
     pub threads: usize,
-    /// How fine the truth is for a tip; [`truth::resolution`] but for tests that cannot wait.
-    pub resolution: fn(&Tip) -> Resolution,
+    /// How fine the truth is: [`truth::TRUTH`], but for tests that cannot wait.
+    pub resolution: Resolution,
 }
 
 impl Order {
     /// `paths` paths on `scene` from `seed` with `threads` threads.
     pub fn new(scene: &str, paths: u32, seed: u64, threads: usize) -> Self {
-        Order { scene: scene.to_owned(), paths, seed, threads, resolution: truth::resolution }
+        Order { scene: scene.to_owned(), paths, seed, threads, resolution: truth::TRUTH }
     }
 
     /// Indices of the scenes among the built-in names.
@@ -199,7 +198,7 @@ impl<'a> Work<'a> {
                 &own
             }
         };
-        Ok(match Path::new(&plan, prepared, (self.order.resolution)(&plan.needle.shape.tip)) {
+        Ok(match Path::new(&plan, prepared, self.order.resolution) {
             Ok(path) => path.run(memory),
             Err(cause) => none(cause),
         })
