@@ -6,6 +6,7 @@
 
 mod answer;
 pub mod beds;
+mod bent;
 pub mod budget;
 pub mod calibration;
 pub mod choice;
@@ -27,6 +28,7 @@ use crate::mesh::wall::WallTopology;
 use crate::needle::Body;
 use crate::patch::Patch;
 use crate::progress::Progress;
+use crate::scene::puncture::PRESSURE_PER_MODULUS;
 use crate::scene::{Scene, SceneSurface};
 use crate::solve::newton;
 use beds::Beds;
@@ -37,10 +39,9 @@ use linear::press;
 use question::Begun;
 pub(crate) use question::{CutOrGrid, Question};
 
-/// Normal force over the needle's cross-section, in Young's moduli of the innermost retina, beyond which tissue models of this kind do not
-/// hold: the needle punctures. Chosen where the finite-element levels still converge throughout; no puncture force of the retina is
-/// published.
-pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = 0.75;
+/// Normal force over the needle's cross-section, in Young's moduli of the softest retina, beyond which a force is refused: there the finite-element levels
+/// no longer converge throughout. A scene may let its tissue puncture earlier, which is told in the answer.
+pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = PRESSURE_PER_MODULUS.max;
 
 /// Depth beyond which no answer is given, as a share of retina and choroid under the contact.
 pub const MAX_DEPTH_SHARE: f64 = 0.7;

@@ -54,7 +54,7 @@ const ONE_WAY: [(&str, &[&str]); 17] = [
     ),
     ("solve", &["surface", "patch", "tissue", "needle", "scene", "effects", "mesh", "equilibrium", "predict"]),
     ("approach.rs", &["effect", "effects", "mesh", "assemble", "solve", "equilibrium", "predict"]),
-    ("equilibrium.rs", &["patch", "scene", "layered", "predict"]),
+    ("equilibrium", &["patch", "scene", "layered", "predict"]),
     ("predict", &["sequence"]),
 ];
 
@@ -62,8 +62,7 @@ const ONE_WAY: [(&str, &[&str]); 17] = [
 const LONGEST: usize = 400;
 
 /// Longer files, and why they are one file.
-const LONG_FILES: [(&str, &str); 3] = [
-    ("core/src/equilibrium.rs", "one wall under one needle: mesh, touch, load steps and report share their state"),
+const LONG_FILES: [(&str, &str); 2] = [
     ("tests/numerics/effects.rs", "one derivative check with a row for each effect"),
     (
         "tests/verification/finite_element/block.rs",

@@ -8,9 +8,11 @@
 mod effects;
 mod equilibrium;
 mod frames;
+mod puncture;
 mod refusals;
 mod repeatability;
 mod sequences;
 mod shape;
 mod support;
+mod tool_flex;
 mod zeros;

@@ -13,5 +13,6 @@ mod meshes;
 mod needle;
 mod patch;
 mod scene;
+mod shaft;
 mod surface;
 mod tissue;

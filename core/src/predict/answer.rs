@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::choice::adhesion::Pull;
 use super::choice::friction::Sliding;
-use super::choice::{Decision, Expected};
+use super::choice::{self, Decision, Expected};
 use super::expected_error::ExpectedError;
 use super::finite_element::{Bench, COARSE, ContactEstimate, FiniteElementAnswer, Problem, Resolution};
 use super::linear::LinearAnswer;
@@ -14,9 +14,10 @@ use super::question::{Begun, Question, Sink};
 use super::topologies::shared_topology;
 use super::types::{ContactReport, ContactState, Level, NeedleOutcome, PredictError, Prediction, SolverReport};
 use super::{PENETRATION_WARNING_MM, Workspace};
-use crate::effects::{adhesion, contact, friction};
-use crate::equilibrium::Solid;
+use crate::effects::puncture::{Burden, Nearest};
+use crate::effects::{adhesion, contact, friction, puncture, tool_flex};
 use crate::equilibrium::settled::Settled;
+use crate::equilibrium::{Solid, Tool};
 use crate::patch::vertex_normals;
 use crate::progress::Progress;
 use crate::solve::newton;
@@ -35,11 +36,14 @@ impl Question<'_> {
             depth_mm: self.prepared.scene.tissue.retina_thickness_mm(),
             strength_kpa: self.prepared.scene.tissue.bond.strength_kpa,
         };
+        let limits = self.puncture_limits();
         let linear = match self.begin(&self.raised(&sink))? {
             Begun::Pressed(linear) => linear,
             Begun::Still(why) => {
                 let strain = sink.expected_mm / self.yielding_mm();
-                let decision = self.decide(Expected { depth_mm: sink.expected_mm, strain, sliding, pull }, &sink)?;
+                let bending = self.bending(None);
+                let expected = Expected { depth_mm: sink.expected_mm, strain, sliding, pull, bending, limits };
+                let decision = self.decide(expected, &sink)?;
                 return Ok(self.at_rest(decision, sink.change_kpa, why));
             }
         };
@@ -52,7 +56,9 @@ impl Question<'_> {
             depth_mm: pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
             ..pull
         };
-        let expected = Expected { depth_mm: moved_mm, strain: moved_mm / self.yielding_mm(), sliding, pull };
+        let strain_moved = moved_mm / self.yielding_mm();
+        let bending = self.bending(Some(&linear));
+        let expected = Expected { depth_mm: moved_mm, strain: strain_moved, sliding, pull, bending, limits };
         let decision = self.decide(expected, &sink)?;
         if !decision.contact {
             return Ok(self.at_rest(decision, sink.change_kpa, "contact is not simulated"));
@@ -70,6 +76,7 @@ impl Question<'_> {
     pub(crate) fn with_node_penetration(&self, mut answer: FiniteElementAnswer) -> FiniteElementAnswer {
         let mut pose = self.tool.patch_from_needle;
         pose.translation.vector += self.motion.direction.into_inner() * answer.travel_mm;
+        pose.translation.vector += answer.deflection.unwrap_or_default();
         let penetration = |(vertex, moved): (&Point3<f64>, &Vector3<f64>)| {
             -self.tool.body.distance(&pose.inverse_transform_point(&(vertex + moved)))
         };
@@ -87,6 +94,7 @@ impl Question<'_> {
         FiniteElementAnswer {
             displacements,
             travel_mm,
+            deflection: None,
             reaction_mn: linear.press.touch.inward.into_inner() * -linear.normal_force_mn,
             contact: ContactReport {
                 state: ContactState::Touching,
@@ -96,25 +104,31 @@ impl Question<'_> {
                 max_strain: strain,
                 slipping_share: None,
                 bond_damage: None,
+                puncture_share: 0.0,
             },
             solver: SolverReport::default(),
-            estimate: self.estimate(linear),
+            estimate: self.estimate(linear, false),
         }
     }
 
     /// Linear surface displacement, fading with depth as the layers share a uniform pressure.
-    pub(crate) fn start<'b>(&self, linear: &'b LinearAnswer) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
+    pub(crate) fn start<'b>(
+        &self,
+        linear: &'b LinearAnswer,
+        bends: bool,
+    ) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
+        let shift = self.bent(linear, bends).shift;
         let layers = self.prepared.scene.tissue.layers();
         let compliance: Vec<f64> =
             layers.iter().map(|named| named.layer.thickness_mm / named.layer.youngs_modulus_kpa).collect();
         let total: f64 = compliance.iter().sum();
-        move |parameter, depth_in_layers| {
+        move |[x, y], depth_in_layers| {
             let above: f64 = compliance
                 .iter()
                 .enumerate()
                 .map(|(layer, c)| c * (depth_in_layers - layer as f64).clamp(0.0, 1.0))
                 .sum();
-            linear.displacement(parameter) * (1.0 - above / total)
+            linear.displacement([x - shift.x, y - shift.y]) * (1.0 - above / total)
         }
     }
 
@@ -122,7 +136,10 @@ impl Question<'_> {
         Problem {
             patch: self.patch(),
             tissue: &self.prepared.scene.tissue,
-            tool: self.tool,
+            tool: Tool {
+                stiffness_mn_per_mm: self.request.needle.stiffness_mn_per_mm.filter(|_| decision.tool_flex),
+                ..self.tool
+            },
             motion: self.motion,
             solid: decision.solid,
             friction_coefficient: decision.friction.then_some(self.prepared.scene.friction_coefficient),
@@ -149,8 +166,9 @@ impl Question<'_> {
         };
         let mut bench =
             Bench { level: Level::Coarse.name(), resolution: &COARSE, topology: &topology, workspace: solver };
-        let start = self.start(linear);
-        self.problem(decision, change_kpa).solve(&mut bench, &self.estimate(linear), &start, progress)
+        let start = self.start(linear, decision.tool_flex);
+        let estimate = self.estimate(linear, decision.tool_flex);
+        self.problem(decision, change_kpa).solve(&mut bench, &estimate, &start, progress)
     }
 
     /// A finer answer than `coarse`, on a mesh made for the contact that `coarse` finds.
@@ -172,9 +190,9 @@ impl Question<'_> {
         let aim = ContactEstimate {
             center: coarse.estimate.center,
             radius_mm: coarse.estimate.radius_mm,
-            ..self.estimate(linear)
+            ..self.estimate(linear, decision.tool_flex)
         };
-        let start = self.start(linear);
+        let start = self.start(linear, decision.tool_flex);
         let mut answer = self.problem(decision, change_kpa).solve(&mut bench, &aim, &start, progress)?;
         answer.solver.iterations += coarse.solver.iterations;
         Ok(answer)
@@ -183,7 +201,7 @@ impl Question<'_> {
     /// The answer without contact: the surface at rest, or where the pressure moves it.
     pub(crate) fn at_rest(&self, mut decision: Decision, change_kpa: Option<f64>, reason: &str) -> Prediction {
         for report in &mut decision.reports {
-            if [contact::NAME, friction::NAME, adhesion::NAME].contains(&report.name) {
+            if [contact::NAME, friction::NAME, adhesion::NAME, tool_flex::NAME].contains(&report.name) {
                 report.simulated = false;
                 report.reason = reason.to_owned();
             }
@@ -193,6 +211,7 @@ impl Question<'_> {
         let answer = FiniteElementAnswer {
             displacements: self.patch().parameters.iter().map(moved).collect(),
             travel_mm: 0.0,
+            deflection: None,
             reaction_mn: Vector3::zeros(),
             contact: ContactReport {
                 state: ContactState::Clear,
@@ -202,9 +221,16 @@ impl Question<'_> {
                 max_strain: settled.as_ref().map_or(0.0, Settled::max_strain),
                 slipping_share: None,
                 bond_damage: None,
+                puncture_share: 0.0,
             },
             solver: SolverReport::default(),
-            estimate: ContactEstimate { center: [0.0; 2], radius_mm: 0.0, touch_mm: 0.0, travel_mm: 0.0 },
+            estimate: ContactEstimate {
+                center: [0.0; 2],
+                radius_mm: 0.0,
+                touch_mm: 0.0,
+                travel_mm: 0.0,
+                deflection: Vector3::zeros(),
+            },
         };
         let expected = match settled {
             Some(_) => ExpectedError::UNKNOWN,
@@ -214,11 +240,30 @@ impl Question<'_> {
         self.prediction(answer, decision, expected)
     }
 
+    /// Holds the answer against what the tissue bears; what to say if it is more.
+    fn judge(&self, answer: &mut FiniteElementAnswer, decision: &mut Decision) -> Option<String> {
+        let limits = self.puncture_limits();
+        let burden = match answer.contact.state {
+            ContactState::Clear => Burden::default(),
+            _ => Burden { force_mn: answer.reaction_mn.norm(), strain: answer.contact.max_strain },
+        };
+        for report in decision.reports.iter_mut().filter(|report| report.name == puncture::NAME) {
+            *report = choice::puncture::report(&limits, &burden);
+        }
+        let nearest = limits.nearest(&burden);
+        answer.contact.puncture_share = nearest.share();
+        nearest.is_beyond().then(|| {
+            answer.contact.state = ContactState::Punctured;
+            let Nearest { measure, value, limit, .. } = nearest;
+            format!("the tissue is punctured: the {measure} is {value:.4}, beyond {limit:.4}; the surface is that of tissue as if it were still whole")
+        })
+    }
+
     /// The answer in scene coordinates.
     pub(crate) fn prediction(
         &self,
-        answer: FiniteElementAnswer,
-        decision: Decision,
+        mut answer: FiniteElementAnswer,
+        mut decision: Decision,
         expected: ExpectedError,
     ) -> Prediction {
         let patch = self.patch();
@@ -228,6 +273,7 @@ impl Question<'_> {
         let frame = &patch.scene_from_patch;
         let direction = frame * self.motion.direction.into_inner();
         let mut warnings = Vec::new();
+        warnings.extend(self.judge(&mut answer, &mut decision));
         let unused = decision.reports.iter().find(|r| !r.simulated && r.value > r.threshold && r.value.is_some());
         if let Some(effect) = unused {
             warnings.push(format!("`{}` is not simulated though the scene calls for it", effect.name));
@@ -239,6 +285,8 @@ impl Question<'_> {
                 penetration_mm * 1e3
             ));
         }
+        let deflection_mm = answer.deflection.map(|deflection| frame * deflection);
+        let rigid_tip = self.request.needle.tip_mm + direction * answer.travel_mm;
         Prediction {
             vertices: deformed.iter().map(|vertex| frame * vertex).collect(),
             normals: normals.iter().map(|normal| frame * normal).collect(),
@@ -246,8 +294,9 @@ impl Question<'_> {
             displacement_um: answer.displacements.iter().map(|moved| moved.norm() * 1e3).collect(),
             source_indices: patch.source_indices.clone(),
             needle: NeedleOutcome {
-                tip_mm: self.request.needle.tip_mm + direction * answer.travel_mm,
+                tip_mm: deflection_mm.map_or(rigid_tip, |deflection| rigid_tip + deflection),
                 travel_mm: answer.travel_mm,
+                deflection_mm,
                 reaction_mn: frame * answer.reaction_mn,
             },
             contact: answer.contact,

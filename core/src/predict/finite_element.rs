@@ -1,6 +1,6 @@
 //! The finite-element levels: where the mesh stands, how fine it is, and the solve on it.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use super::types::{ContactReport, ContactState, PredictError, SolverReport};
 use crate::effect::Local;
@@ -104,6 +104,8 @@ pub struct ContactEstimate {
     pub touch_mm: f64,
     /// Travel of the needle at equilibrium (mm).
     pub travel_mm: f64,
+    /// How far the tip then stands aside of a rigid needle's (mm).
+    pub deflection: Vector3<f64>,
 }
 
 /// Thickness of the innermost element of the retina, in contact radii over the number of elements through it.
@@ -118,6 +120,8 @@ pub struct FiniteElementAnswer {
     pub displacements: Vec<Vector3<f64>>,
     /// Travel of the needle (mm).
     pub travel_mm: f64,
+    /// How far the tip stands aside of a rigid needle's (mm), where the shaft bends.
+    pub deflection: Option<Vector3<f64>>,
     /// Force of the tissue on the needle (mN).
     pub reaction_mn: Vector3<f64>,
     /// The contact.
@@ -196,7 +200,7 @@ impl Problem<'_> {
         let wall = self.wall(topology, resolution, &self.mesh(resolution, estimate))?;
         let (motion, touch_mm) = self.aimed(&wall, resolution, estimate);
         let mut positions = wall.displaced(start);
-        wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm));
+        wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm + estimate.deflection));
         progress.stage("equilibrium");
         let pressure = self.pressure_kpa.map(|pressure_kpa| Pressure { pressure_kpa });
         let interface = self.bond.map(|bond| (bond, Interface::new(&topology.interface, &wall.geometry.rest)));
@@ -321,6 +325,7 @@ impl Problem<'_> {
         FiniteElementAnswer {
             displacements: self.patch.parameters.iter().map(node).collect(),
             travel_mm: equilibrium.travel_mm,
+            deflection: equilibrium.deflection,
             reaction_mn: equilibrium.reaction_mn,
             contact: report(&summary, wall.max_strain(&equilibrium.positions)),
             solver: SolverReport {
@@ -334,6 +339,7 @@ impl Problem<'_> {
                 radius_mm: (summary.area_mm2 / std::f64::consts::PI).sqrt(),
                 touch_mm,
                 travel_mm: equilibrium.travel_mm,
+                deflection: equilibrium.deflection.unwrap_or_default(),
             },
         }
     }
@@ -360,10 +366,6 @@ fn report(summary: &ContactSummary, max_strain: f64) -> ContactReport {
         max_strain,
         slipping_share: None,
         bond_damage: None,
+        puncture_share: 0.0,
     }
-}
-
-/// The tip's position at the end of a motion, patch frame.
-pub fn final_tip(tool: &Tool, motion: &Motion, travel_mm: f64) -> Point3<f64> {
-    Point3::from(tool.patch_from_needle.translation.vector + motion.direction.into_inner() * travel_mm)
 }
