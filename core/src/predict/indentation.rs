@@ -2,7 +2,7 @@
 //!
 //! Every step has a mesh of its own, laid around the contact that `coarse` finds at that travel, as in a single prediction. It starts from the
 //! step before: meshes of one topology stand to their contacts alike, so each vertex takes along its displacement, moved by the difference of what linear
-//! elasticity expects of it at the two steps. Simulated are finite strain and frictionless contact ([`EFFECTS`]).
+//! elasticity expects of it at the two steps. Simulated are finite strain and frictionless contact with a rigid needle ([`EFFECTS`]).
 //!
 //! Also here: what linear elasticity expects of a request, in numbers ([`PreparedScene::expect`]). Not here: which travels are worth a step.
 //! Patch frame for what is expected, scene coordinates for what is answered; the built-in scenes' are the same.
@@ -205,12 +205,13 @@ impl<'a> Indentation<'a> {
     ) -> Result<(FiniteElementAnswer, Before), PredictError> {
         let decision = decided(question, linear)?;
         let found = question.coarse(linear, &decision, None, &mut memory.coarse, progress)?.estimate;
-        let aim = ContactEstimate { center: found.center, radius_mm: found.radius_mm, ..question.estimate(linear) };
+        let aim =
+            ContactEstimate { center: found.center, radius_mm: found.radius_mm, ..question.estimate(linear, false) };
         progress.stage("mesh");
         let problem = question.problem(&decision, None);
         let wall = problem.wall(&self.topology, &self.resolution, &problem.mesh(&self.resolution, &aim))?;
         let (motion, touch_mm) = problem.aimed(&wall, &self.resolution, &aim);
-        let mut expected = wall.displaced(&question.start(linear));
+        let mut expected = wall.displaced(&question.start(linear, false));
         wall.place_tip(&mut expected, &(motion.direction.into_inner() * motion.travel_mm));
         let start = carried(before.as_ref(), &expected);
         progress.stage("equilibrium");
@@ -247,6 +248,8 @@ fn decided(question: &Question, linear: &LinearAnswer) -> Result<Decision, Predi
             depth_mm: tissue.retina_thickness_mm(),
             strength_kpa: tissue.bond.strength_kpa,
         },
+        bending: question.bending(Some(linear)),
+        limits: question.puncture_limits(),
     };
     question.decide(expected, &question.sink())
 }

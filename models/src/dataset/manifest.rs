@@ -3,6 +3,7 @@
 //! Nothing in it depends on how many threads made the data, on the time or on the machine.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::Path;
 
 use retina_core::predict::indentation::EFFECTS;
@@ -122,6 +123,20 @@ impl Settings {
             }
         }
         Ok(())
+    }
+}
+
+impl fmt::Display for Counts {
+    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
+        writeln!(
+            to,
+            "{} samples of {} paths, {} of them with all {} steps",
+            self.all_samples(),
+            self.finished,
+            self.complete,
+            draw::STEPS
+        )?;
+        self.ended_by.iter().try_for_each(|(cause, paths)| writeln!(to, "- {paths} paths ended early: {cause}"))
     }
 }
 
