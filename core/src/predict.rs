@@ -2,7 +2,7 @@
 //!
 //! [`PreparedScene`] holds what depends on the scene alone; [`Workspace`] is a thread's memory. Read on in `types` (what goes in and comes
 //! out), `question` (a request in the patch's frame), `answer` (level by level), `linear` (the layered answer, start of all others),
-//! `finite_element` (the levels on meshes), `choice` (effects), `budget` and `expected_error` (levels). Not here: HTTP, clocks, threads.
+//! `finite_element` (the levels on meshes), `choice` (effects), `budget` and `expected_error` (levels), `indentation` (many steps of one needle). Not here: HTTP, clocks, threads.
 
 mod answer;
 pub mod beds;
@@ -12,6 +12,7 @@ pub mod calibration;
 pub mod choice;
 pub mod expected_error;
 pub mod finite_element;
+pub mod indentation;
 pub mod linear;
 mod question;
 pub(crate) mod topologies;

@@ -5,6 +5,7 @@
 //! Not here: laws of whole answers and closed forms of mechanics, which have tiers of their own.
 
 mod budget;
+mod dataset;
 mod effects;
 mod mesh;
 mod mesh_file;

@@ -36,6 +36,9 @@ pub struct Resolution {
     pub core_per_contact: f64,
     /// Distance from the contact's edge to the fixed rim (mm).
     pub rim_mm: f64,
+    /// How the rings widen outwards: the logarithm of ring i's radius grows as the share of rings within it to this power. 1: all by one ratio; above: fine
+    /// rings at the contact's edge, wide ones at the rim.
+    pub ring_grading: f64,
     /// The contact's numerical parameters.
     pub contact: ContactSettings,
 }
@@ -53,6 +56,7 @@ pub const COARSE: Resolution = Resolution {
     sclera_elements: 0,
     core_per_contact: 0.8,
     rim_mm: 1.5,
+    ring_grading: 1.0,
     contact: ContactSettings {
         stiffness_kpa_per_mm: 4e4,
         smoothing_mm: 2e-3,
@@ -71,6 +75,7 @@ pub const REFERENCE: Resolution = Resolution {
     sclera_elements: 1,
     core_per_contact: 1.0,
     rim_mm: 2.0,
+    ring_grading: 1.0,
     contact: ContactSettings {
         stiffness_kpa_per_mm: 3e5,
         smoothing_mm: 2e-4,
@@ -182,8 +187,12 @@ impl Problem<'_> {
         let contact = estimate.radius_mm.max(SMALLEST_CONTACT * needle_radius);
         let core = resolution.core_per_contact * contact;
         let rim = contact + resolution.rim_mm;
-        let ratio = (rim / core).powf(1.0 / resolution.rings as f64);
-        let radii = (0..=resolution.rings).map(|ring| core * ratio.powi(ring as i32)).collect();
+        let rings = resolution.rings as f64;
+        let ratio = (rim / core).powf(1.0 / rings);
+        // Zero without grading, and then without a trace.
+        let graded = |share: f64| rings * (share.powf(resolution.ring_grading) - share);
+        let radius = |ring: usize| core * ratio.powi(ring as i32) * ratio.powf(graded(ring as f64 / rings));
+        let radii = (0..=resolution.rings).map(radius).collect();
         MeshSize {
             disc: DiscGeometry { center: estimate.center, radii },
             first_element_mm: FIRST_ELEMENT_PER_CONTACT * contact / resolution.retina_elements as f64,
