@@ -3,5 +3,10 @@
 //! Read in this order: `sample` (one load step of a path, as every program here sees it) → `shard` (samples on disk) → `dataset` (how
 //! they are made).
 
+pub mod commands;
+pub mod contact;
+pub mod data;
+pub mod describe;
 pub mod sample;
 pub mod shard;
+pub mod train;

@@ -1,0 +1,3 @@
+//! The commands: arguments in, files and tables out.
+
+pub mod train;

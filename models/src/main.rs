@@ -1,0 +1,33 @@
+//! The command line of `retina-models`.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use retina_models::commands;
+
+/// Data, training and evaluation of the learned retina patch.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Trains a network on a data set.
+    Train(commands::train::Arguments),
+}
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().command {
+        Command::Train(arguments) => commands::train::run(&arguments),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
