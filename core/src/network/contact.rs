@@ -95,8 +95,15 @@ pub struct Memory {
     shared: Vec<f32>,
     out: Vec<f32>,
     pooled: Vec<f32>,
-    hidden: Vec<f32>,
-    activated: Vec<f32>,
+    motion: Vec<f32>,
+    quantiles: Vec<f32>,
+}
+
+impl Memory {
+    /// Coefficients, motion and logarithms of the error's quantiles over the depth, of the last prediction.
+    pub fn answered(&self) -> (&[f32], &[f32], &[f32]) {
+        (&self.out, &self.motion, &self.quantiles)
+    }
 }
 
 /// What a network answers.
@@ -194,7 +201,7 @@ impl ContactNetwork {
         let start = coarse.unwrap_or(&input.linear);
         let mut answer = self.assemble(input, start, memory);
         projection::out_of_needle(input, &mut answer);
-        let error_mm = [0, 1].map(|k| input.depth_mm * memory.activated[k].exp());
+        let error_mm = [0, 1].map(|k| input.depth_mm * memory.quantiles[k].exp());
         Some(Corrected { answer, error_mm, known: self.knows(&memory.features.global) })
     }
 
@@ -206,9 +213,9 @@ impl ContactNetwork {
         })
     }
 
-    /// Coefficients into `memory.out`, the motion's numbers into `memory.hidden`, the quantiles' logarithms into `memory.activated`.
+    /// Coefficients into `memory.out`, the motion's numbers into `memory.motion`, the quantiles' logarithms into `memory.quantiles`.
     fn forward(&self, graph: &Graph, memory: &mut Memory) {
-        let Memory { features, x, mean, sum, shared, out, pooled, hidden, activated } = memory;
+        let Memory { features, x, mean, sum, shared, out, pooled, motion, quantiles } = memory;
         let (width, size) = (self.width, NODE_COUNT * self.width);
         for buffer in [&mut *x, mean, sum] {
             buffer.resize(size, 0.0);
@@ -238,14 +245,14 @@ impl ContactNetwork {
         for (to, ((number, mean), scale)) in pooled[width..].iter_mut().zip(standard) {
             *to = (number - mean) * scale;
         }
-        self.motion.forward(pooled, sum, hidden);
-        self.quantile.forward(pooled, sum, activated);
-        activated.iter_mut().zip(&self.shift).for_each(|(quantile, shift)| *quantile += shift);
+        self.motion.forward(pooled, sum, motion);
+        self.quantile.forward(pooled, sum, quantiles);
+        quantiles.iter_mut().zip(&self.shift).for_each(|(quantile, shift)| *quantile += shift);
     }
 
     /// Displacements, travel and reaction from what `forward` left.
     fn assemble(&self, input: &Input, start: &Answer, memory: &Memory) -> Answer {
-        let Memory { features, out, hidden: motion, .. } = memory;
+        let Memory { features, out, motion, .. } = memory;
         let mut displacement_mm: Field = start.displacement_mm;
         for (node, moved) in displacement_mm.iter_mut().enumerate() {
             let coefficients = &out[node * BASIS..][..BASIS];

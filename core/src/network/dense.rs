@@ -41,3 +41,19 @@ pub fn fill_rows(out: &mut [f32], row: &[f32]) {
         target.copy_from_slice(row);
     }
 }
+
+/// `out = x wᵀ`: `x` of `rows × inner`, `w` of `columns × inner`.
+///
+/// # Panics
+/// If the lengths do not fit together.
+pub fn product_transposed(out: &mut [f32], x: &[f32], w: &[f32], columns: usize, inner: usize) {
+    let rows = x.len() / inner;
+    matmul(
+        MatMut::from_row_major_slice_mut(out, rows, columns),
+        Accum::Replace,
+        MatRef::from_row_major_slice(x, rows, inner),
+        MatRef::from_row_major_slice(w, columns, inner).transpose(),
+        1.0_f32,
+        Par::Seq,
+    );
+}

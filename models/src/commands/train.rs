@@ -9,6 +9,7 @@ use clap::{Args, ValueEnum};
 use crate::contact::learn::ContactLearner;
 use crate::contact::network::Form;
 use crate::data::Data;
+use crate::faithful::learn::FaithfulLearner;
 use crate::train::checkpoint::write_whole;
 use crate::train::export::{self, Named};
 use crate::train::record::{self, Record};
@@ -21,6 +22,8 @@ pub enum Which {
     Contact,
     /// Corrects level `coarse`.
     Corrected,
+    /// The paper's.
+    Faithful,
 }
 
 /// Arguments of `train`.
@@ -44,15 +47,15 @@ pub struct Arguments {
     /// Everything random follows from it.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Samples a step.
-    #[arg(long, default_value_t = 64)]
-    batch: usize,
-    /// Largest step of Adam.
-    #[arg(long, default_value_t = 2e-3)]
-    rate: f32,
-    /// Weight decay per unit of step.
-    #[arg(long, default_value_t = 1e-2)]
-    decay: f32,
+    /// Samples a step: 64, or the paper's 4.
+    #[arg(long)]
+    batch: Option<usize>,
+    /// Largest step of Adam: 2e-3, or the paper's 4e-4.
+    #[arg(long)]
+    rate: Option<f32>,
+    /// Weight decay per unit of step: 1e-2, or the paper's none.
+    #[arg(long)]
+    decay: Option<f32>,
     /// Epochs without a better validation after which it ends.
     #[arg(long, default_value_t = 100)]
     patience: usize,
@@ -69,8 +72,18 @@ pub struct Arguments {
 
 /// Hidden width of the heads.
 const HIDDEN: usize = 64;
-/// Samples whose gradient is computed at once.
-const CHUNK: usize = 16;
+/// How a network is trained unless told.
+struct Defaults {
+    batch: usize,
+    /// Samples whose gradient is computed at once.
+    chunk: usize,
+    rate: f32,
+    decay: f32,
+}
+/// The contact networks.
+const CONTACT: Defaults = Defaults { batch: 64, chunk: 16, rate: 2e-3, decay: 1e-2 };
+/// The paper's: its public configuration.
+const FAITHFUL: Defaults = Defaults { batch: 4, chunk: 1, rate: 4e-4, decay: 0.0 };
 /// File of the settings that a run began with.
 const SETTINGS: &str = "settings.json";
 
@@ -80,15 +93,19 @@ const SETTINGS: &str = "settings.json";
 /// What reading, training or writing said.
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let data = Data::read(&arguments.data)?;
+    if arguments.network == Which::Faithful {
+        let learner = FaithfulLearner::new(&data.samples);
+        let state = train(arguments, &learner, &FAITHFUL)?;
+        return finish(arguments, &learner, &data, &state, learner.tensors(&state.best));
+    }
     let Arguments { width, blocks, messages, .. } = *arguments;
-    let form =
-        Form { coarse: arguments.network == Which::Corrected, width, blocks, messages, hidden: HIDDEN };
+    let form = Form { coarse: arguments.network == Which::Corrected, width, blocks, messages, hidden: HIDDEN };
     let learner = ContactLearner::new(form, &data.samples);
-    let state = train(arguments, &learner, CHUNK)?;
+    let state = train(arguments, &learner, &CONTACT)?;
     finish(arguments, &learner, &data, &state, learner.tensors(&state.best))
 }
 
-fn train(arguments: &Arguments, learner: &dyn Learner, chunk: usize) -> Result<State, Box<dyn Error>> {
+fn train(arguments: &Arguments, learner: &dyn Learner, defaults: &Defaults) -> Result<State, Box<dyn Error>> {
     let [train, validation] = learner.counts();
     if train == 0 || validation == 0 {
         return Err(format!("{train} samples to train on and {validation} to validate on are too few").into());
@@ -98,10 +115,10 @@ fn train(arguments: &Arguments, learner: &dyn Learner, chunk: usize) -> Result<S
     let mut settings = Settings {
         seed: arguments.seed,
         epochs: 0,
-        batch: arguments.batch,
-        chunk,
-        rate: arguments.rate,
-        decay: arguments.decay,
+        batch: arguments.batch.unwrap_or(defaults.batch),
+        chunk: defaults.chunk,
+        rate: arguments.rate.unwrap_or(defaults.rate),
+        decay: arguments.decay.unwrap_or(defaults.decay),
         patience: arguments.patience,
     };
     let begun: Option<Settings> = std::fs::read(&kept).ok().and_then(|text| serde_json::from_slice(&text).ok());

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use retina_core::network::contact::{QUANTILES, Start};
 use retina_core::network::features::Features;
 
-use super::loss::{LEVELS, SMALLEST_UM, loss, node_errors_um};
+use super::loss::{LEVELS, loss, of_motion, worst_um};
 use super::network::{Form, Network, Pass, Slopes};
 use super::prepared::{Normaliser, Prepared};
 use crate::describe;
@@ -49,14 +49,18 @@ impl ContactLearner {
         ContactLearner { network: Network::new(form, describe::graph()), local, global, train, validation }
     }
 
+    /// The standardised samples of the validation split.
+    pub fn validation(&self) -> &[Prepared] {
+        &self.validation
+    }
+
     /// The logarithms of the worst node's error over the depth, less the predicted quantiles, for every sample of the validation split.
     fn surprises(&self, parameters: &[f32]) -> [Vec<f32>; QUANTILES] {
         let mut surprises: [Vec<f32>; QUANTILES] = Default::default();
         let mut pass = Pass::default();
         for sample in &self.validation {
             self.network.forward(parameters, &[sample], &mut pass);
-            let worst_um = node_errors_um(sample, &pass.out).map(|error| error.norm()).fold(SMALLEST_UM, f32::max);
-            let target = (worst_um / sample.depth_um).ln();
+            let target = (worst_um(sample, &pass.out) / sample.depth_um).ln();
             for (surprises, quantile) in surprises.iter_mut().zip(&pass.quantile) {
                 surprises.push(target - quantile);
             }
@@ -115,7 +119,7 @@ impl Learner for ContactLearner {
         [self.train.len(), self.validation.len()]
     }
 
-    fn learn(&self, parameters: &[f32], samples: &[usize], weight: f32, gradient: &mut [f32]) -> Score {
+    fn learn(&self, parameters: &[f32], samples: &[usize], _epoch: usize, weight: f32, gradient: &mut [f32]) -> Score {
         let chosen: Vec<&Prepared> = samples.iter().map(|&index| &self.train[index]).collect();
         KEPT.with_borrow_mut(|(pass, slopes)| {
             self.network.forward(parameters, &chosen, pass);
@@ -129,7 +133,8 @@ impl Learner for ContactLearner {
         let chosen: Vec<&Prepared> = samples.iter().map(|&index| &self.validation[index]).collect();
         KEPT.with_borrow_mut(|(pass, slopes)| {
             self.network.forward(parameters, &chosen, pass);
-            loss(&chosen, pass, 0.0, slopes)
+            // The quantiles are set right on this split afterwards, whatever they are.
+            of_motion(&chosen, pass, 0.0, slopes)
         })
     }
 }

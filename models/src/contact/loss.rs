@@ -47,43 +47,61 @@ pub fn node_errors_um<'a>(sample: &'a Prepared, out: &'a [f32]) -> impl Iterator
 
 /// The loss over `samples`, and its derivatives times `weight` into `slopes`.
 pub fn loss(samples: &[&Prepared], pass: &Pass, weight: f32, slopes: &mut Slopes) -> Score {
-    let mut loss = Score::default();
-    for buffer in [&mut slopes.out, &mut slopes.motion, &mut slopes.quantile] {
-        buffer.clear();
-    }
+    let mut score = of_motion(samples, pass, weight, slopes);
+    score.total += of_quantiles(samples, pass, weight, slopes);
+    score
+}
+
+/// The part of nodes, travel and reaction.
+pub fn of_motion(samples: &[&Prepared], pass: &Pass, weight: f32, slopes: &mut Slopes) -> Score {
+    let mut score = Score::default();
+    slopes.out.clear();
+    slopes.motion.clear();
     let per_node = 1.0 / NODE_COUNT as f32;
     let outs = pass.out.chunks_exact(NODE_COUNT * BASIS);
-    for (at, (sample, out)) in samples.iter().zip(outs).enumerate() {
-        let mut worst_um = SMALLEST_UM;
+    for ((sample, out), motion) in samples.iter().zip(outs).zip(pass.motion.chunks_exact(MOTION)) {
         let mut total = 0.0;
         for (error, basis) in node_errors_um(sample, out).zip(&sample.basis_um) {
             let (value, slope) = pseudo_huber(error, NODE_UM);
             total += per_node * value;
-            let length = error.norm();
-            loss.node_um += f64::from(per_node * length);
-            worst_um = worst_um.max(length);
+            score.node_um += f64::from(per_node * error.norm());
             slopes.out.extend(basis.iter().map(|vector| weight * per_node * vector.dot(&slope)));
         }
-        let motion = &pass.motion[at * MOTION..][..MOTION];
         let travel = Vector3::x() * (sample.travel_excess_um + sample.depth_um * motion[0]);
         let (value, slope) = pseudo_huber(travel, TRAVEL_UM);
         total += TRAVEL_WEIGHT * value;
-        loss.travel_um += f64::from(travel.x.abs());
+        score.travel_um += f64::from(travel.x.abs());
         slopes.motion.push(weight * TRAVEL_WEIGHT * slope.x * sample.depth_um);
         let sides = sample.sides.iter().zip(&motion[1..]);
         let reaction = sides.fold(sample.reaction_excess, |error, (side, c)| error + side * *c);
-        loss.reaction += f64::from(reaction.norm());
+        score.reaction += f64::from(reaction.norm());
         let (value, slope) = pseudo_huber(reaction * PERCENT, REACTION_PERCENT);
         total += REACTION_WEIGHT * value;
         slopes.motion.extend(sample.sides.map(|side| weight * REACTION_WEIGHT * PERCENT * slope.dot(&side)));
-        let target = (worst_um / sample.depth_um).ln();
-        for (quantile, level) in pass.quantile[at * QUANTILES..].iter().zip(LEVELS) {
+        score.total += f64::from(total);
+    }
+    score
+}
+
+/// The part of the error's quantiles; the error itself counts as given.
+pub fn of_quantiles(samples: &[&Prepared], pass: &Pass, weight: f32, slopes: &mut Slopes) -> f64 {
+    let mut total = 0.0;
+    slopes.quantile.clear();
+    let outs = pass.out.chunks_exact(NODE_COUNT * BASIS);
+    for ((sample, out), quantiles) in samples.iter().zip(outs).zip(pass.quantile.chunks_exact(QUANTILES)) {
+        let target = (worst_um(sample, out) / sample.depth_um).ln();
+        for (quantile, level) in quantiles.iter().zip(LEVELS) {
             let above = target - quantile;
-            let (value, slope) = if above > 0.0 { (level * above, -level) } else { ((level - 1.0) * above, 1.0 - level) };
-            total += QUANTILE_WEIGHT * value;
+            let (value, slope) =
+                if above > 0.0 { (level * above, -level) } else { ((level - 1.0) * above, 1.0 - level) };
+            total += f64::from(QUANTILE_WEIGHT * value);
             slopes.quantile.push(weight * QUANTILE_WEIGHT * slope);
         }
-        loss.total += f64::from(total);
     }
-    loss
+    total
+}
+
+/// Error of a sample's worst node (µm), not less than [`SMALLEST_UM`].
+pub fn worst_um(sample: &Prepared, out: &[f32]) -> f32 {
+    node_errors_um(sample, out).map(|error| error.norm()).fold(SMALLEST_UM, f32::max)
 }

@@ -103,7 +103,11 @@ pub fn read(folder: &Path, learner: &dyn Learner, settings: &Settings) -> Result
     let vector = |name: &str| -> Result<Vec<f32>, CheckpointError> {
         let bytes = tensors.tensor(name).map_err(|_| damaged())?.data();
         let numbers: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|four| f32::from_le_bytes(*four)).collect();
-        if numbers.len() == learner.layout().len() { Ok(numbers) } else { Err(other("has another number of parameters")) }
+        if numbers.len() == learner.layout().len() {
+            Ok(numbers)
+        } else {
+            Err(other("has another number of parameters"))
+        }
     };
     let mut adam = Adam::new(0, settings.decay);
     adam.m = vector("m")?;

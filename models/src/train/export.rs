@@ -21,7 +21,9 @@ pub fn weights(network: &str, tensors: &[Named], about: &[(&str, String)]) -> Re
         tensors.iter().map(|(_, _, numbers)| numbers.iter().flat_map(|n| n.to_le_bytes()).collect()).collect();
     let views = || -> Result<Vec<(&str, TensorView)>, SafeTensorError> {
         let pairs = tensors.iter().zip(&bytes);
-        pairs.map(|((name, shape, _), bytes)| Ok((name.as_str(), TensorView::new(Dtype::F32, shape.clone(), bytes)?))).collect()
+        pairs
+            .map(|((name, shape, _), bytes)| Ok((name.as_str(), TensorView::new(Dtype::F32, shape.clone(), bytes)?)))
+            .collect()
     };
     // The format orders the tensors' bytes by itself: they are hashed as it lays them out.
     let bare = safetensors::serialize(views()?, None)?;

@@ -25,8 +25,8 @@ pub trait Learner: Sync {
     fn initial(&self, random: &mut fastrand::Rng) -> Vec<f32>;
     /// Number of samples of the training and of the validation split.
     fn counts(&self) -> [usize; 2];
-    /// Score of these samples of the training split, and `weight` times its derivative added to `gradient`.
-    fn learn(&self, parameters: &[f32], samples: &[usize], weight: f32, gradient: &mut [f32]) -> Score;
+    /// Score of these samples of the training split in `epoch`, and `weight` times its derivative added to `gradient`.
+    fn learn(&self, parameters: &[f32], samples: &[usize], epoch: usize, weight: f32, gradient: &mut [f32]) -> Score;
     /// Score of these samples of the validation split.
     fn judge(&self, parameters: &[f32], samples: &[usize]) -> Score;
 }
@@ -77,9 +77,8 @@ pub struct State {
 impl State {
     /// The epoch with the lowest validation loss.
     pub fn best_epoch(&self) -> Option<usize> {
-        (0..self.curve.len()).min_by(|&a, &b| {
-            f64::total_cmp(&self.curve[a].validation.total, &self.curve[b].validation.total)
-        })
+        (0..self.curve.len())
+            .min_by(|&a, &b| f64::total_cmp(&self.curve[a].validation.total, &self.curve[b].validation.total))
     }
 }
 
@@ -97,7 +96,7 @@ pub fn epochs_within(learner: &dyn Learner, settings: &Settings, minutes: f64) -
     let mut seconds = Vec::new();
     for _ in 0..TIMED_BATCHES {
         let start = Instant::now();
-        step_gradient(learner, settings, &parameters, &batch, &mut gradient);
+        step_gradient(learner, settings, &parameters, &batch, 0, &mut gradient);
         seconds.push(start.elapsed().as_secs_f64());
     }
     seconds.sort_by(f64::total_cmp);
@@ -110,6 +109,7 @@ fn step_gradient(
     settings: &Settings,
     parameters: &[f32],
     batch: &[usize],
+    epoch: usize,
     gradient: &mut [f32],
 ) -> Score {
     let weight = 1.0 / batch.len() as f32;
@@ -117,7 +117,7 @@ fn step_gradient(
         .par_chunks(settings.chunk)
         .map(|chunk| {
             let mut part = vec![0.0; parameters.len()];
-            (learner.learn(parameters, chunk, weight, &mut part), part)
+            (learner.learn(parameters, chunk, epoch, weight, &mut part), part)
         })
         .collect();
     gradient.fill(0.0);
@@ -154,7 +154,8 @@ pub fn train(learner: &dyn Learner, settings: &Settings, folder: &Path) -> Resul
     };
     let mut state = checkpoint::read(folder, learner, settings)?.unwrap_or_else(initial);
     let style = ProgressStyle::with_template("{bar:30} epoch {pos}/{len} {elapsed}+{eta} {msg}");
-    let bar = ProgressBar::new(settings.epochs as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar =
+        ProgressBar::new(settings.epochs as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar.set_position(state.curve.len() as u64);
     bar.reset_eta();
     let before = state.curve.last().map_or(0.0, |epoch| epoch.seconds);
@@ -165,10 +166,11 @@ pub fn train(learner: &dyn Learner, settings: &Settings, folder: &Path) -> Resul
         let epoch = state.curve.len();
         let mut order: Vec<usize> = (0..count).collect();
         // A stream of its own for each epoch, so that a resumed run draws the same.
-        fastrand::Rng::with_seed(settings.seed ^ (epoch as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15)).shuffle(&mut order);
+        fastrand::Rng::with_seed(settings.seed ^ (epoch as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15))
+            .shuffle(&mut order);
         let mut train = Score::default();
         for (at, batch) in order.chunks(settings.batch).enumerate() {
-            train += step_gradient(learner, settings, &state.parameters, batch, &mut gradient);
+            train += step_gradient(learner, settings, &state.parameters, batch, epoch, &mut gradient);
             let progress = (epoch as f32 + at as f32 / batches as f32) / settings.epochs as f32;
             state.adam.step(&mut state.parameters, &gradient, rate(settings.rate, progress));
         }

@@ -77,7 +77,12 @@ impl StandIn {
         let across = needle.orientation * Vector3::new(side.cos(), side.sin(), 0.0);
         let direction = points.into_inner() * lean.cos() + across * lean.sin();
         let force = self.between(0.03_f64.ln(), 0.7_f64.ln()).exp() * 20.0 * PI * radius_mm * radius_mm;
-        Request { needle, control: Control::Force(direction * force), level: Level::Linear, effects: EffectChoice::Auto }
+        Request {
+            needle,
+            control: Control::Force(direction * force),
+            level: Level::Linear,
+            effects: EffectChoice::Auto,
+        }
     }
 
     fn answered(&mut self, request: &Request, scene: usize, path: u32, split: Split) -> Result<Sample, PredictError> {
