@@ -7,6 +7,7 @@ pub mod commands;
 pub mod contact;
 pub mod data;
 pub mod describe;
+pub mod evaluate;
 pub mod faithful;
 pub mod sample;
 pub mod shard;

@@ -17,11 +17,14 @@ struct Arguments {
 enum Command {
     /// Trains a network on a data set.
     Train(commands::train::Arguments),
+    /// Prints and keeps every table about a data set and the networks.
+    Evaluate(commands::evaluate::Arguments),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Train(arguments) => commands::train::run(&arguments),
+        Command::Evaluate(arguments) => commands::evaluate::run(&arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

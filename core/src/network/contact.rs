@@ -76,6 +76,8 @@ pub struct ContactNetwork {
     motion: Head,
     quantile: Head,
     shift: Vec<f32>,
+    /// Quantiles of the error over the depth by bins of tip and strain, and the strains of the training.
+    prior: Vec<f32>,
     /// Means and inverse deviations of the request's numbers.
     global_mean: Vec<f32>,
     global_scale: Vec<f32>,
@@ -121,6 +123,18 @@ pub struct Corrected {
 pub const MOTION: usize = 1 + SIDES;
 /// Numbers that the quantiles' head answers.
 pub const QUANTILES: usize = 2;
+/// Upper ends of the bins of mean strain of [`ContactNetwork::prior`]; the last bin has none.
+pub const PRIOR_STRAINS: [f32; 2] = [0.1, 0.3];
+/// Tips with and without an edge.
+pub const TIP_BINS: usize = 2;
+/// Place of the mean strain among a request's numbers.
+pub const STRAIN: usize = 2;
+
+/// The bin of a mean strain.
+pub fn strain_bin(strain: f32) -> usize {
+    PRIOR_STRAINS.iter().filter(|&&end| strain >= end).count()
+}
+
 /// A request is known where its numbers leave the extremes of the training by at most this share of their range.
 const MARGIN: f32 = 0.02;
 
@@ -165,6 +179,7 @@ impl ContactNetwork {
             motion: Head::new(&weights, "motion", width + globals, MOTION)?,
             quantile: Head::new(&weights, "quantile", width + globals, QUANTILES)?,
             shift: weights.take("quantile.shift", &[QUANTILES])?,
+            prior: weights.take("prior", &[TIP_BINS, PRIOR_STRAINS.len() + 1, QUANTILES])?,
             low: weights.take("range.global.low", &[globals])?,
             high: weights.take("range.global.high", &[globals])?,
             global_mean,
@@ -175,6 +190,17 @@ impl ContactNetwork {
     /// Which answer it corrects.
     pub fn start(&self) -> Start {
         self.start
+    }
+
+    /// Quantiles of the worst node's error over the depth before anything is computed: those of the validation in the bin of tip and strain.
+    pub fn prior(&self, edged: bool, strain: f32) -> [f32; QUANTILES] {
+        let bin = usize::from(edged) * (PRIOR_STRAINS.len() + 1) + strain_bin(strain);
+        [0, 1].map(|k| self.prior[bin * QUANTILES + k])
+    }
+
+    /// Whether a mean strain (depth over what yields) lies between the extremes of the training.
+    pub fn knows_depth(&self, strain: f32) -> bool {
+        (self.low[STRAIN]..=self.high[STRAIN]).contains(&strain)
     }
 
     /// Memory that it holds (bytes).

@@ -29,41 +29,60 @@ impl Question<'_> {
         progress: &mut dyn Progress,
     ) -> Result<Prediction, PredictError> {
         let sink = self.sink();
-        let sliding = Sliding { coefficient: self.prepared.scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
-        let pull = Pull {
-            normal_force_mn: 0.0,
-            depth_mm: self.prepared.scene.tissue.retina_thickness_mm(),
-            strength_kpa: self.prepared.scene.tissue.bond.strength_kpa,
-        };
         let linear = match self.begin(&self.raised(&sink))? {
             Begun::Pressed(linear) => linear,
             Begun::Still(why) => {
                 let strain = sink.expected_mm / self.yielding_mm();
+                let (sliding, pull) = self.unpressed();
                 let decision = self.decide(Expected { depth_mm: sink.expected_mm, strain, sliding, pull }, &sink)?;
                 return Ok(self.at_rest(decision, sink.change_kpa, why));
             }
         };
         let strain = linear.depth_mm / self.yielding_mm();
-        let moved_mm = linear.depth_mm + sink.expected_mm;
-        let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
-        let [x, y] = linear.press.touch.parameter;
-        let pull = Pull {
-            normal_force_mn: linear.normal_force_mn,
-            depth_mm: pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
-            ..pull
-        };
-        let expected = Expected { depth_mm: moved_mm, strain: moved_mm / self.yielding_mm(), sliding, pull };
+        let expected = self.expected(&linear, &sink);
         let decision = self.decide(expected, &sink)?;
         if !decision.contact {
             return Ok(self.at_rest(decision, sink.change_kpa, "contact is not simulated"));
         }
-        let answer = match self.request.level {
-            Level::Linear => self.linear(&linear, strain, &sink),
-            Level::Coarse => self.coarse(&linear, &decision, sink.change_kpa, workspace, progress)?,
-            Level::Reference => self.fine(resolution, &linear, &decision, sink.change_kpa, workspace, progress)?,
+        let of_level = || self.situation_under(&linear).expected_error(self.request.level);
+        let (answer, expected) = match self.request.level {
+            Level::Linear => (self.linear(&linear, strain, &sink), of_level()),
+            Level::Network => self.by_network(&linear, strain, &decision, &sink, workspace, progress)?,
+            Level::Coarse => (self.coarse(&linear, &decision, sink.change_kpa, workspace, progress)?, of_level()),
+            Level::Corrected => self.by_correction(&linear, &decision, &sink, workspace, progress)?,
+            Level::Reference => {
+                (self.fine(resolution, &linear, &decision, sink.change_kpa, workspace, progress)?, of_level())
+            }
         };
-        let expected = self.situation_under(&linear).expected_error(self.request.level);
         Ok(self.prediction(self.with_node_penetration(answer), decision, expected))
+    }
+
+    /// How a needle slides and pulls that does not press.
+    fn unpressed(&self) -> (Sliding, Pull) {
+        let scene = &self.prepared.scene;
+        let pull = Pull {
+            normal_force_mn: 0.0,
+            depth_mm: scene.tissue.retina_thickness_mm(),
+            strength_kpa: scene.tissue.bond.strength_kpa,
+        };
+        (Sliding { coefficient: scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 }, pull)
+    }
+
+    /// What the linear answer expects of the effects.
+    pub(super) fn expected(&self, linear: &LinearAnswer, sink: &Sink) -> Expected {
+        let moved_mm = linear.depth_mm + sink.expected_mm;
+        let (sliding, pull) = self.unpressed();
+        let [x, y] = linear.press.touch.parameter;
+        Expected {
+            depth_mm: moved_mm,
+            strain: moved_mm / self.yielding_mm(),
+            sliding: Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding },
+            pull: Pull {
+                normal_force_mn: linear.normal_force_mn,
+                depth_mm: pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
+                ..pull
+            },
+        }
     }
 
     /// Adds to the reported penetration that of the patch's own nodes: a coarse face may cut a sharp edge between its quadrature points.

@@ -66,7 +66,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 3)]
     blocks: usize,
     /// How many of them hear their neighbours.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 0)]
     messages: usize,
 }
 

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use rayon::prelude::*;
-use retina_core::network::contact::{QUANTILES, Start};
+use retina_core::network::contact::{PRIOR_STRAINS, QUANTILES, Start, TIP_BINS, strain_bin};
 use retina_core::network::features::Features;
 
 use super::loss::{LEVELS, loss, of_motion, worst_um};
@@ -24,6 +24,13 @@ pub struct ContactLearner {
     global: Normaliser,
     train: Vec<Prepared>,
     validation: Vec<Prepared>,
+}
+
+/// Of n numbers the ⌈p (n + 1)⌉-th smallest, where there are as many.
+fn conformal(mut numbers: Vec<f32>, level: f32) -> Option<f32> {
+    numbers.sort_by(f32::total_cmp);
+    let rank = (f64::from(level) * (numbers.len() + 1) as f64).ceil() as usize;
+    numbers.get(rank.wrapping_sub(1)).copied()
 }
 
 thread_local! {
@@ -68,13 +75,31 @@ impl ContactLearner {
         surprises
     }
 
+    /// Quantiles of the worst node's error over the depth, in the core's bins of tip and strain, conformal as the shifts are.
+    fn prior(&self, parameters: &[f32]) -> Vec<f32> {
+        let mut bins = vec![Vec::new(); TIP_BINS * (PRIOR_STRAINS.len() + 1)];
+        let mut pass = Pass::default();
+        for sample in &self.validation {
+            self.network.forward(parameters, &[sample], &mut pass);
+            let bin = usize::from(sample.edged) * (PRIOR_STRAINS.len() + 1) + strain_bin(sample.strain);
+            bins[bin].push(worst_um(sample, &pass.out) / sample.depth_um);
+        }
+        let all: Vec<f32> = bins.concat();
+        // A bin with too few samples for a bound has that of all samples twice over.
+        bins.into_iter()
+            .flat_map(|ratios| {
+                LEVELS.map(|level| conformal(ratios.clone(), level).or(conformal(all.clone(), level).map(|q| 2.0 * q)))
+            })
+            .map(|quantile| quantile.unwrap_or(1.0))
+            .collect()
+    }
+
     /// What has to be added to the quantiles' logarithms so that they hold on the validation split: of n surprises the ⌈p (n + 1)⌉-th smallest
     /// (conformalised quantile regression: Romano, Patterson & Candès 2019).
     fn shifts(&self, parameters: &[f32]) -> Vec<f32> {
-        let shift = |(mut surprises, level): (Vec<f32>, f32)| {
-            surprises.sort_by(f32::total_cmp);
-            let rank = (f64::from(level) * (surprises.len() + 1) as f64).ceil() as usize;
-            surprises.get(rank.saturating_sub(1)).or(surprises.last()).copied().unwrap_or(0.0)
+        let shift = |(surprises, level): (Vec<f32>, f32)| {
+            let largest = surprises.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+            conformal(surprises, level).unwrap_or(largest)
         };
         self.surprises(parameters).into_iter().zip(LEVELS).map(shift).collect()
     }
@@ -98,6 +123,8 @@ impl ContactLearner {
             named("range.global.high", &self.global.high),
             named("quantile.shift", &self.shifts(parameters)),
         ]);
+        let prior = vec![TIP_BINS, PRIOR_STRAINS.len() + 1, QUANTILES];
+        tensors.push(("prior".to_owned(), prior, self.prior(parameters)));
         tensors
     }
 }

@@ -1,6 +1,8 @@
 //! Samples as the contact networks are trained on: described once, before the first epoch.
 
 use nalgebra::{Matrix3, Vector3};
+use retina_core::needle::Tip;
+use retina_core::network::contact::STRAIN;
 use retina_core::network::features::{BASIS, Features, SIDES};
 use retina_core::patch::NODE_COUNT;
 
@@ -31,6 +33,10 @@ pub struct Prepared {
     pub sides: [Vector3<f32>; SIDES],
     /// Depth of the linear answer (µm).
     pub depth_um: f32,
+    /// That depth over the thickness of what yields.
+    pub strain: f32,
+    /// Whether the tip has an edge.
+    pub edged: bool,
 }
 
 impl Prepared {
@@ -52,6 +58,8 @@ impl Prepared {
             reaction_excess: across * (start.reaction_mn - truth.reaction_mn) / input.force_mn,
             sides: features.sides.map(|side| across * side),
             depth_um: input.depth_mm * UM,
+            strain: features.global[STRAIN],
+            edged: input.shape.tip != Tip::Hemispherical,
             local: features.local,
             global: features.global,
             pool: features.pool,
