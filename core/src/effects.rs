@@ -7,11 +7,16 @@ pub mod finite_strain;
 pub mod friction;
 pub mod inertia;
 pub mod pressure;
+pub mod puncture;
 pub mod solid;
+pub mod tool_flex;
 pub mod viscoelasticity;
 
+/// Effects without an energy: they judge an equilibrium and move nothing.
+pub const WITHOUT_ENERGY: [&str; 1] = [puncture::NAME];
+
 /// Names of every effect, in the order in which reports list them.
-pub const EFFECT_NAMES: [&str; 8] = [
+pub const EFFECT_NAMES: [&str; 10] = [
     elasticity::NAME,
     finite_strain::NAME,
     contact::NAME,
@@ -20,4 +25,6 @@ pub const EFFECT_NAMES: [&str; 8] = [
     adhesion::NAME,
     viscoelasticity::NAME,
     inertia::NAME,
+    tool_flex::NAME,
+    puncture::NAME,
 ];

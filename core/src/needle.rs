@@ -1,12 +1,13 @@
-//! A rigid needle: its shape and its pose in the scene.
+//! A needle: its shape, its pose in the scene, and how stiff its shaft is.
 //!
 //! Contract: the shaft runs along local +z from the tip, the needle points along local −z, and `tip_mm` is the foremost point of the
 //! needle: the apex on the axis, or for a bevel the sharp point, which lies towards local +x. Units: mm, degrees.
 //!
-//! Not here: what the needle does to the tissue (`effect`), how the shaft bends (`effect`), triangles to draw it.
+//! Not here: what the needle does to the tissue (`effect`), what bending does (`effect`), triangles to draw it.
 
 pub mod body;
 pub mod gauge;
+pub mod shaft;
 pub mod shape;
 mod underside;
 
@@ -14,6 +15,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, Unit, UnitQuaternion
 
 pub use body::{Body, SignedDistance};
 pub use gauge::{GAUGES, Gauge, UnknownGauge};
+use shaft::STIFFNESS;
 pub use shape::{NeedleShape, Tip};
 
 use crate::range::{OutOfRange, ParameterRange};
@@ -47,12 +49,14 @@ pub struct Needle {
     pub tip_mm: Point3<f64>,
     /// Rotation from needle-local to scene coordinates.
     pub orientation: UnitQuaternion<f64>,
+    /// Force for a deflection of the tip across the shaft, mN/mm; `None`: the shaft is rigid.
+    pub stiffness_mn_per_mm: Option<f64>,
 }
 
 impl Needle {
-    /// A needle that points along `direction` (scene coordinates), turned by [`orientation_pointing`].
+    /// A needle with a rigid shaft that points along `direction` (scene coordinates), turned by [`orientation_pointing`].
     pub fn pointing(shape: NeedleShape, tip_mm: Point3<f64>, direction: &Unit<Vector3<f64>>) -> Self {
-        Self { shape, tip_mm, orientation: orientation_pointing(direction) }
+        Self { shape, tip_mm, orientation: orientation_pointing(direction), stiffness_mn_per_mm: None }
     }
 
     /// The direction in which the needle points, in scene coordinates.
@@ -70,6 +74,9 @@ impl Needle {
         self.shape.validate()?;
         for (index, &coordinate) in self.tip_mm.coords.iter().enumerate() {
             TIP_COORDINATE.check(&format!("needle.tip_mm[{index}]"), coordinate)?;
+        }
+        if let Some(stiffness) = self.stiffness_mn_per_mm {
+            STIFFNESS.check("needle.stiffness_mn_per_mm", stiffness)?;
         }
         ORIENTATION_NORM.check("needle.orientation_xyzw", self.orientation.quaternion().norm())
     }

@@ -2,15 +2,18 @@
 //!
 //! [`PreparedScene`] holds what depends on the scene alone; [`Workspace`] is a thread's memory. Read on in `types` (what goes in and comes
 //! out), `question` (a request in the patch's frame), `answer` (level by level), `linear` (the layered answer, start of all others),
-//! `finite_element` (the levels on meshes), `networks` and `learned` (the learned levels), `choice` (effects), `budget` and `expected_error` (levels). Not here: HTTP, clocks, threads.
+//! `finite_element` (the levels on meshes), `networks` and `learned` (the learned levels), `choice` (effects), `budget` and `expected_error` (levels),
+//! `indentation` (many steps of one needle). Not here: HTTP, clocks, threads.
 
 mod answer;
 pub mod beds;
+mod bent;
 pub mod budget;
 pub mod calibration;
 pub mod choice;
 pub mod expected_error;
 pub mod finite_element;
+pub mod indentation;
 mod learned;
 pub mod linear;
 pub mod networks;
@@ -29,6 +32,7 @@ use crate::needle::Body;
 use crate::network::contact::Memory;
 use crate::patch::Patch;
 use crate::progress::Progress;
+use crate::scene::puncture::PRESSURE_PER_MODULUS;
 use crate::scene::{Scene, SceneSurface};
 use crate::solve::newton;
 use beds::Beds;
@@ -41,10 +45,9 @@ use networks::Networks;
 use question::Begun;
 pub(crate) use question::{CutOrGrid, Question};
 
-/// Normal force over the needle's cross-section, in Young's moduli of the innermost retina, beyond which tissue models of this kind do not
-/// hold: the needle punctures. Chosen where the finite-element levels still converge throughout; no puncture force of the retina is
-/// published.
-pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = 0.75;
+/// Normal force over the needle's cross-section, in Young's moduli of the softest retina, beyond which a force is refused: there the finite-element levels
+/// no longer converge throughout. A scene may let its tissue puncture earlier, which is told in the answer.
+pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = PRESSURE_PER_MODULUS.max;
 
 /// Depth beyond which no answer is given, as a share of retina and choroid under the contact.
 pub const MAX_DEPTH_SHARE: f64 = 0.7;

@@ -3,9 +3,11 @@
 //! Contract: a scene does not change during a prediction. The built-in ones stand at the origin, so their patch frame is the scene
 //! frame. Units: mm, kPa.
 //!
-//! Not here: the needle and its force (they come with each request), effects, the ranges of pressure and friction (`conditions`).
+//! Not here: the needle and its force (they come with each request), effects, the ranges of pressure and friction (`conditions`), where the tissue
+//! punctures (`puncture`).
 
 pub mod conditions;
+pub mod puncture;
 
 use std::sync::Arc;
 
@@ -17,6 +19,7 @@ use crate::range::{OutOfRange, ParameterRange};
 use crate::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA, Surface, TriangleMesh};
 use crate::tissue::Tissue;
 use conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
+use puncture::Puncture;
 
 /// Thickness of the retina around the built-in fovea, mm: its thickest by the source of [`PIT_DEPTH`], so the floor is 0.10 mm.
 pub const FOVEA_RETINA_MM: f64 = 0.23;
@@ -66,6 +69,8 @@ pub struct Scene {
     pub pressure_kpa: f64,
     /// Pressure in the eye when the surface was measured, kPa.
     pub rest_pressure_kpa: f64,
+    /// Where the tissue punctures.
+    pub puncture: Puncture,
 }
 
 impl Scene {
@@ -90,6 +95,7 @@ impl Scene {
             friction_coefficient: FRICTION_COEFFICIENT.default,
             pressure_kpa: EYE_PRESSURE.default,
             rest_pressure_kpa: EYE_PRESSURE.default,
+            puncture: Puncture::default(),
         })
     }
 
@@ -104,6 +110,7 @@ impl Scene {
         FRICTION_COEFFICIENT.check("friction_coefficient", self.friction_coefficient)?;
         EYE_PRESSURE.check("pressure_kpa", self.pressure_kpa)?;
         EYE_PRESSURE.check("rest_pressure_kpa", self.rest_pressure_kpa)?;
+        self.puncture.validate()?;
         match self.surface {
             SceneSurface::Flat | SceneSurface::Mesh(_) => {}
             SceneSurface::Sphere { radius_mm } => EYE_RADIUS.check("surface.radius_mm", radius_mm)?,

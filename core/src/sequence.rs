@@ -7,7 +7,7 @@
 //! Where the mesh stands: a mesh as coarse as `coarse` answers well only for the contact that it was made for (a contact of half the radius is off by a
 //! third of its motion). So without memory a step keeps the mesh, and starts from the step before, while its expected contact stays within
 //! two hundredths of a radius of the one that the mesh was laid around, as in a stream at haptic rate; else it gets a mesh of its own and a fresh linear
-//! start, and says so. What tissue remembers lives in its elements: with memory one mesh lasts from first to last. It is laid around
+//! start, and says so. Tissue once punctured stays so in every step that follows, which say since when. What tissue remembers lives in its elements: with memory one mesh lasts from first to last. It is laid around
 //! all expected contacts, level `coarse` divides it more finely ([`LASTING`]), and a step whose contact leaves its fine zone carries a
 //! warning that says by how much.
 //!
@@ -167,6 +167,8 @@ pub struct Simulation<'a> {
     laid: Option<Laid>,
     settled: Option<Settled>,
     history: Option<History>,
+    /// The first step whose tissue was punctured, and its time (s).
+    punctured: Option<(usize, f64)>,
 }
 
 impl<'a> Simulation<'a> {
@@ -226,6 +228,7 @@ impl<'a> Simulation<'a> {
             laid: None,
             settled: None,
             history: None,
+            punctured: None,
         })
     }
 

@@ -1,6 +1,7 @@
 //! Linear and nonlinear solution: the sparse Cholesky factorisation (the one place that names faer's sparse code) and Newton's
 //! method on top of it.
 
+mod border;
 pub mod globalization;
 pub mod newton;
 pub mod sparse;

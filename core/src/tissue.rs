@@ -162,6 +162,11 @@ impl Tissue {
         self.retina.iter().map(|layer| layer.thickness_mm).sum()
     }
 
+    /// Young's modulus of the softest part of the retina, kPa.
+    pub fn softest_retina_kpa(&self) -> f64 {
+        self.retina.iter().fold(f64::INFINITY, |low, layer| low.min(layer.youngs_modulus_kpa))
+    }
+
     /// Holds every number against [`ranges`]; the retina's thickness both by sublayer and as a sum.
     ///
     /// Fails with the first field that is outside, from the vitreous outwards.

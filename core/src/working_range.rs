@@ -32,8 +32,7 @@ pub struct WorkingRange {
 impl WorkingRange {
     /// Requests on `tissue`, from `seed`.
     pub fn new(tissue: &Tissue, seed: u64) -> Self {
-        let modulus_kpa = tissue.retina.iter().fold(f64::INFINITY, |low, layer| low.min(layer.youngs_modulus_kpa));
-        WorkingRange { random: fastrand::Rng::with_seed(seed), modulus_kpa }
+        WorkingRange { random: fastrand::Rng::with_seed(seed), modulus_kpa: tissue.softest_retina_kpa() }
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {

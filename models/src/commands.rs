@@ -1,4 +1,7 @@
 //! The commands: arguments in, files and tables out.
 
+pub mod dataset;
+pub mod deformcontact;
 pub mod evaluate;
 pub mod train;
+pub mod truth_error;

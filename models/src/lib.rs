@@ -6,6 +6,7 @@
 pub mod commands;
 pub mod contact;
 pub mod data;
+pub mod dataset;
 pub mod describe;
 pub mod evaluate;
 pub mod faithful;

@@ -19,12 +19,27 @@ enum Command {
     Train(commands::train::Arguments),
     /// Prints and keeps every table about a data set and the networks.
     Evaluate(commands::evaluate::Arguments),
+    /// Makes samples of random indentation paths; the same command again goes on where it stopped.
+    Dataset(commands::dataset::Arguments),
+    /// Prints how far the surface moves in a data set, and how far off the cheap answers are.
+    DatasetReport(commands::dataset::ReportArguments),
+    /// Measures how far the truth of the samples is from level `reference`, on random paths.
+    TruthError(commands::truth_error::Arguments),
+    /// Writes a data set in the layout that the public DeformContact code reads.
+    ExportDeformcontact(commands::deformcontact::ExportArguments),
+    /// Reads that layout back and says what is there.
+    ImportDeformcontact(commands::deformcontact::ImportArguments),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Train(arguments) => commands::train::run(&arguments),
         Command::Evaluate(arguments) => commands::evaluate::run(&arguments),
+        Command::Dataset(arguments) => commands::dataset::run(&arguments),
+        Command::DatasetReport(arguments) => commands::dataset::run_report(&arguments),
+        Command::TruthError(arguments) => commands::truth_error::run(&arguments),
+        Command::ExportDeformcontact(arguments) => commands::deformcontact::run_export(&arguments),
+        Command::ImportDeformcontact(arguments) => commands::deformcontact::run_import(&arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,5 +1,6 @@
 //! What there is to choose from, told from the core's own tables.
 
+use retina_core::needle::shaft::{STIFFNESS, stiffness_mn_per_mm};
 use retina_core::needle::shape::{BEVEL_ANGLE, EDGE_RADIUS, RADIUS};
 use retina_core::needle::{GAUGES, TIP_COORDINATE};
 use retina_core::patch::{NODES_PER_SIDE, SPACING_MM};
@@ -7,6 +8,7 @@ use retina_core::predict::Level;
 use retina_core::predict::budget::DEFAULT_LEVEL;
 use retina_core::range::ParameterRange;
 use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
+use retina_core::scene::puncture::{MAX_FORCE, MAX_STRAIN, PRESSURE_PER_MODULUS, Puncture, PunctureForce};
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::sequence::TIME_STEP;
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
@@ -21,7 +23,8 @@ use crate::wire::catalog::{
     GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
 };
 use crate::wire::scene::{
-    BondSpec, LayerSpec, PronyTermSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec,
+    BondSpec, LayerSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec,
+    TissueSpec,
 };
 
 /// The built-in scenes, and every parameter with its range.
@@ -64,6 +67,7 @@ pub fn gauges() -> GaugeList {
         name: gauge.name,
         outer_diameter_mm: gauge.outer_diameter_mm,
         source: gauge.source,
+        stiffness_mn_per_mm: stiffness_mn_per_mm(gauge.radius_mm()),
     });
     GaugeList { default: DEFAULT_GAUGE, gauges: gauges.into() }
 }
@@ -98,7 +102,16 @@ fn spec(scene: &Scene) -> SceneSpec {
         friction_coefficient: Some(scene.friction_coefficient),
         pressure_kpa: Some(scene.pressure_kpa),
         rest_pressure_kpa: Some(scene.rest_pressure_kpa),
+        puncture: Some(puncture(&scene.puncture)),
     }
+}
+
+fn puncture(puncture: &Puncture) -> PunctureSpec {
+    let (pressure_per_modulus, max_force_mn) = match puncture.force {
+        PunctureForce::PressurePerModulus(share) => (Some(share), None),
+        PunctureForce::Force(force_mn) => (None, Some(force_mn)),
+    };
+    PunctureSpec { pressure_per_modulus, max_force_mn, max_strain: Some(puncture.max_strain) }
 }
 
 fn tissue(tissue: &Tissue) -> TissueSpec {
@@ -140,6 +153,7 @@ fn parameters() -> Vec<ParameterEntry> {
         ("accuracy.max_time_ms", &MAX_TIME),
         ("needle.tip_mm", &TIP_COORDINATE),
         ("needle.radius_mm", &RADIUS),
+        ("needle.stiffness_mn_per_mm", &STIFFNESS),
         ("needle.tip.flat.edge_radius_mm", &EDGE_RADIUS),
         ("needle.tip.bevelled.edge_radius_mm", &EDGE_RADIUS),
         ("needle.tip.bevelled.angle_deg", &BEVEL_ANGLE),
@@ -157,6 +171,9 @@ fn parameters() -> Vec<ParameterEntry> {
         ("scene.friction_coefficient", &FRICTION_COEFFICIENT),
         ("scene.pressure_kpa", &EYE_PRESSURE),
         ("scene.rest_pressure_kpa", &EYE_PRESSURE),
+        ("scene.puncture.pressure_per_modulus", &PRESSURE_PER_MODULUS),
+        ("scene.puncture.max_force_mn", &MAX_FORCE),
+        ("scene.puncture.max_strain", &MAX_STRAIN),
     ];
     let layers = [
         ("inner_limiting_membrane", &INNER_LIMITING_MEMBRANE),

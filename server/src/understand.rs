@@ -166,6 +166,17 @@ pub(crate) fn unknown_name(field: &str, name: &str, known: &[&str]) -> Problem {
     Problem::field(Kind::UnknownName, field, Some(json!(shown)), allowed, detail)
 }
 
+/// The problem of two fields that exclude each other.
+fn both(field: &str, other: &str) -> Problem {
+    Problem::field(
+        Kind::InvalidRequest,
+        field,
+        None,
+        format!("left out when {other} is given"),
+        format!("{field} and {other} exclude each other"),
+    )
+}
+
 /// A quaternion x, y, z, w of a length near 1, made exactly that long.
 fn rotation(field: &str, xyzw: [f64; 4]) -> Result<nalgebra::UnitQuaternion<f64>, Problem> {
     let quaternion = nalgebra::Quaternion::from(xyzw);

@@ -58,7 +58,7 @@ const ONE_WAY: [(&str, &[&str]); 18] = [
         &["surface", "tissue", "scene", "effect", "effects", "mesh", "assemble", "solve", "equilibrium", "predict"],
     ),
     ("approach.rs", &["effect", "effects", "mesh", "assemble", "solve", "equilibrium", "predict"]),
-    ("equilibrium.rs", &["patch", "scene", "layered", "predict"]),
+    ("equilibrium", &["patch", "scene", "layered", "predict"]),
     ("predict", &["sequence"]),
 ];
 
@@ -66,8 +66,7 @@ const ONE_WAY: [(&str, &[&str]); 18] = [
 const LONGEST: usize = 400;
 
 /// Longer files, and why they are one file.
-const LONG_FILES: [(&str, &str); 3] = [
-    ("core/src/equilibrium.rs", "one wall under one needle: mesh, touch, load steps and report share their state"),
+const LONG_FILES: [(&str, &str); 2] = [
     ("tests/numerics/effects.rs", "one derivative check with a row for each effect"),
     (
         "tests/verification/finite_element/block.rs",

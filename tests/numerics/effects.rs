@@ -1,21 +1,22 @@
 //! Derivatives of every effect against central differences, and what each promises where it must not act.
 //!
-//! Contract: every name in [`EFFECT_NAMES`] has a row in [`ROWS`]; one function, [`check_effect`], checks them all, at three sizes.
+//! Contract: every name in [`EFFECT_NAMES`] but those in [`WITHOUT_ENERGY`] has a row in [`ROWS`]; one function, [`check_effect`], checks them all, at three sizes.
 //! Lengths are scaled with their moduli, so that a row is the same problem in other units of length.
 
 mod adhesion;
 mod friction;
 mod pressure;
+mod tool_flex;
 
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use retina_core::effect::{Effect, Local, Stencils};
-use retina_core::effects::EFFECT_NAMES;
 use retina_core::effects::contact::{Contact, ContactFaces};
 use retina_core::effects::elasticity::Elasticity;
 use retina_core::effects::finite_strain::{FiniteStrain, Lame, NeoHookean};
 use retina_core::effects::inertia::{Inertia, VitreousDrag};
 use retina_core::effects::solid::SolidGeometry;
 use retina_core::effects::viscoelasticity::{Network, Networks};
+use retina_core::effects::{EFFECT_NAMES, WITHOUT_ENERGY};
 use retina_core::mesh::element::{FACE_NODES, NODE_OFFSETS, NODES, TOP_NODES};
 use retina_core::needle::{Body, NeedleShape};
 use retina_tests::tolerance::{DERIVATIVE, EXACT, ROUNDOFF};
@@ -39,7 +40,7 @@ const SIZES: [f64; 3] = [1.0, 1e-3, 1e3];
 const REPEATS: usize = 4;
 
 /// The rows of the derivative check: each runs [`check_effect`] on its effect.
-const ROWS: [(&str, fn()); 8] = [
+const ROWS: [(&str, fn()); 9] = [
     ("elasticity", check_elasticity),
     ("finite_strain", check_finite_strain),
     ("contact", check_contact),
@@ -48,6 +49,7 @@ const ROWS: [(&str, fn()); 8] = [
     ("adhesion", adhesion::check),
     ("viscoelasticity", check_viscoelasticity),
     ("inertia", check_inertia),
+    ("tool_flex", tool_flex::check),
 ];
 
 fn largest(values: &[f64]) -> f64 {
@@ -419,7 +421,11 @@ fn check_contact() {
 #[test]
 fn every_effect_has_a_row() {
     for name in EFFECT_NAMES {
-        assert!(ROWS.iter().any(|row| row.0 == name), "`{name}` has no row in the derivative check");
+        let row = ROWS.iter().any(|row| row.0 == name);
+        assert!(
+            row != WITHOUT_ENERGY.contains(&name),
+            "`{name}` has no row in the derivative check, or no energy and one"
+        );
     }
     for (name, _) in ROWS {
         assert!(EFFECT_NAMES.contains(&name), "a row for `{name}`, which is no effect");

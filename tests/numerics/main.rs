@@ -5,6 +5,7 @@
 //! Not here: laws of whole answers and closed forms of mechanics, which have tiers of their own.
 
 mod budget;
+mod dataset;
 mod effects;
 mod mesh;
 mod mesh_file;
@@ -13,5 +14,6 @@ mod needle;
 mod network;
 mod patch;
 mod scene;
+mod shaft;
 mod surface;
 mod tissue;

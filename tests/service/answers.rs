@@ -101,6 +101,56 @@ fn a_listed_scene_can_be_sent_back_as_it_stands() {
 }
 
 #[test]
+fn a_leaning_needle_bends_by_its_stiffness() {
+    let leaning = json!({
+        "needle": {"tip_mm": [0, 0, 0], "direction": [0.5, 0, -0.8], "gauge": "27G"}, "force_mn": [0.25, 0, -0.4],
+    });
+    let bent = answered(predict(&leaning));
+    assert_matches("PredictResponse", &bent);
+    let length = |vector: &Value| numbers(vector).iter().map(|x| x * x).sum::<f64>().sqrt();
+    // Reaction along the motion 0.472 mN, across it 0.472 tan(32 degrees) = 0.295 mN, over 32 mN/mm.
+    assert!((length(&bent["needle"]["deflection_mm"]) - 0.0092).abs() < 0.0006, "{}", bent["needle"]);
+    let stated = answered(predict(&with(leaning.clone(), "/needle/stiffness_mn_per_mm", json!(32))));
+    assert_eq!(timeless(stated), timeless(bent.clone()), "that is the default of 27G");
+    let softer = answered(predict(&with(leaning.clone(), "/needle/stiffness_mn_per_mm", json!(16))));
+    let ratio = length(&softer["needle"]["deflection_mm"]) / length(&bent["needle"]["deflection_mm"]);
+    assert!((ratio - 2.0).abs() < 0.1, "{ratio}");
+    let rigid = answered(predict(&with(leaning, "/needle/stiffness_mn_per_mm", json!(1e6))));
+    assert_eq!(rigid["needle"].get("deflection_mm"), None);
+    assert!(timeless(rigid) != timeless(bent));
+}
+
+#[test]
+fn puncture_is_always_told() {
+    let row = |answer: &Value| {
+        let effects = answer["effects"].as_array().expect("effects");
+        effects.iter().find(|effect| effect["name"] == "puncture").expect("always there").clone()
+    };
+    for level in ["linear", "coarse"] {
+        for (max_force_mn, state) in [(0.39, "punctured"), (0.41, "touching")] {
+            let scene = json!({"puncture": {"max_force_mn": max_force_mn, "max_strain": 5}});
+            let answer = answered(predict(&with(request(level), "/scene", scene)));
+            assert_matches("PredictResponse", &answer);
+            assert_eq!(answer["contact"]["state"], state, "{level}");
+            let row = row(&answer);
+            assert_eq!((&row["simulated"], &row["threshold"]), (&json!(true), &json!(max_force_mn)));
+            assert!((row["value"].as_f64().expect("number") - 0.4).abs() < 1e-3, "{row}");
+            let told = answer["warnings"].to_string().contains("the tissue is punctured");
+            assert_eq!(told, state == "punctured", "{}", answer["warnings"]);
+        }
+        // Held at a depth and limited by strain: the answer measures it.
+        let held = json!({
+            "needle": {"tip_mm": [0, 0, -0.1]}, "control": "pose", "accuracy": {"level": level},
+            "scene": {"puncture": {"max_strain": 0.02}},
+        });
+        let answer = answered(predict(&held));
+        assert_eq!(answer["contact"]["state"], "punctured");
+        assert!(row(&answer)["reason"].as_str().expect("text").ends_with("the strain"), "{}", row(&answer));
+        assert_eq!(row(&answer)["value"], answer["contact"]["max_strain"]);
+    }
+}
+
+#[test]
 fn a_needle_that_stays_away_moves_nothing() {
     let request = json!({
         "needle": {"tip_mm": [0, 0, 1]}, "control": "pose", "accuracy": {"level": "linear"},

@@ -79,6 +79,7 @@ fn the_lists_name_what_requests_may_name() {
         let request = crate::harness::with(request("linear"), "/needle/gauge", gauge["name"].clone());
         let reply = predict(&crate::harness::with(request, "/force_mn/2", serde_json::json!(-0.01)));
         assert_eq!(reply.status, 200, "{gauge}: {}", reply.body);
+        assert!(gauge["stiffness_mn_per_mm"].as_f64() > Some(1.0), "{gauge}");
     }
     let parameters = get("/v1/scenes").body["parameters"].clone();
     for parameter in parameters.as_array().expect("parameters") {

@@ -46,6 +46,7 @@ fn values_out_of_range() {
         ("/needle/tip_mm", json!([0, 2000, 0]), "needle.tip_mm[1]", "-1000 to 1000 mm"),
         ("/needle/tip", json!({"bevelled": {"angle_deg": 90}}), "needle.tip.bevelled.angle_deg", "15 to 75 deg"),
         ("/needle/tip", json!({"flat": {"edge_radius_mm": 1}}), "needle.tip.flat.edge_radius_mm", "0.0001 to 0.257 mm"),
+        ("/needle/stiffness_mn_per_mm", json!(0), "needle.stiffness_mn_per_mm", "1 to 1000000 mN/mm"),
         ("/force_mn", json!([0, 0, -101]), "force_mn", "length 0 to 100 mN"),
         ("/force_mn", json!([0, 0, -1e300]), "force_mn", "length 0 to 100 mN"),
         ("/scene", json!({"surface": {"kind": "sphere", "radius_mm": -12}}), "scene.surface.radius_mm", "8 to 20 mm"),
@@ -217,6 +218,23 @@ fn a_needle_or_a_force_that_points_away() {
     assert_field(&reply, 422, "points-away", "needle.direction");
     let reply = predict(&with(request("linear"), "/force_mn", json!([0, 0, 0.5])));
     assert_field(&reply, 422, "points-away", "force_mn");
+}
+
+#[test]
+fn limits_of_puncture() {
+    let limited = |puncture: Value| predict(&with(request("linear"), "/scene", json!({"puncture": puncture})));
+    let cases = [
+        (json!({"max_strain": 0}), "scene.puncture.max_strain", "0.01 to 5"),
+        (json!({"max_force_mn": -1}), "scene.puncture.max_force_mn", "0.001 to 100 mN"),
+        (json!({"pressure_per_modulus": 0.8}), "scene.puncture.pressure_per_modulus", "0.005 to 0.75"),
+    ];
+    for (puncture, field, allowed) in cases {
+        assert_eq!(assert_field(&limited(puncture), 422, "out-of-range", field)["allowed"], allowed);
+    }
+    let both = limited(json!({"max_force_mn": 1, "pressure_per_modulus": 0.5}));
+    assert_field(&both, 422, "invalid-request", "scene.puncture.max_force_mn");
+    assert_problem(&limited(json!({"force": 1})), 422, "invalid-request");
+    assert_eq!(limited(json!({})).status, 200);
 }
 
 #[test]

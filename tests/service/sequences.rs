@@ -93,6 +93,21 @@ fn a_static_step_is_the_prediction() {
 }
 
 #[test]
+fn punctured_tissue_stays_punctured() {
+    let service = Running::start(&["--threads", "1"]);
+    let limited = with(ramp(5), "/scene", json!({"puncture": {"max_force_mn": 0.2, "max_strain": 5}}));
+    let lines = lines(&simulate(&service, &limited).2);
+    let steps: Vec<&Value> = lines[1..6].iter().map(|line| &line["step"]).collect();
+    let states: Vec<&str> = steps.iter().map(|step| step["contact"]["state"].as_str().expect("state")).collect();
+    // 0.08, 0.16, 0.24, 0.32 mN, then nothing.
+    assert_eq!(states, ["touching", "touching", "punctured", "punctured", "punctured"]);
+    let since = |step: &&&Value| step["warnings"].to_string().contains("punctured since steps[2] at");
+    assert_eq!(steps.iter().filter(since).count(), 2);
+    let row = lines[0]["begin"]["effects"].as_array().expect("list").iter().find(|effect| effect["name"] == "puncture");
+    assert!(row.expect("always there")["value"].as_f64() > Some(0.3), "{row:?}");
+}
+
+#[test]
 fn the_first_step_is_there_before_the_last_is_computed() {
     let service = Running::start(&["--threads", "1"]);
     let started = Instant::now();

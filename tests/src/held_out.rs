@@ -91,6 +91,7 @@ impl Sample {
             shape,
             tip_mm: Point3::from(self.tip_mm),
             orientation: Unit::new_normalize(Quaternion::from(nalgebra::Vector4::from(self.orientation_xyzw))),
+            stiffness_mn_per_mm: None,
         };
         let control = Control::Force(Vector3::from(self.force_mn));
         Request { needle, control, level, effects: EffectChoice::Auto }

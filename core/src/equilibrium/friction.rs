@@ -9,7 +9,8 @@
 use nalgebra::{Point3, Vector3};
 use thiserror::Error;
 
-use super::{ATTEMPTS, Addition, Drive, Equilibrium, Load, RELATIVE_TOLERANCE, Wall};
+use super::attempts::{ATTEMPTS, RELATIVE_TOLERANCE};
+use super::{Addition, Equilibrium, Load, Wall};
 use crate::effect::{Effect, Local};
 use crate::effects::friction::{Friction, RubbingPoint, anchor};
 use crate::mesh::wall::Place;
@@ -162,10 +163,7 @@ impl Wall<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<NewtonReport, NewtonError> {
-        let drive = match load.motion.force_mn {
-            Some(force_mn) => Drive::Force { direction: load.motion.direction.into_inner(), force_mn },
-            None => Drive::Held,
-        };
+        let drive = self.drive(load.motion, 1.0);
         let mut spent = 0;
         let mut failure = NewtonError::Interrupted { iterations: 0 };
         for attempt in [&ATTEMPTS[0], &ATTEMPTS[ATTEMPTS.len() - 1]] {

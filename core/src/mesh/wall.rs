@@ -57,6 +57,8 @@ pub enum Place {
     Elements,
     /// The inner surface and the needle, [`WallTopology::faces`].
     Faces,
+    /// The needle alone, [`WallTopology::tip`].
+    Tip,
     /// The two sides of the interface, [`WallTopology::interface`].
     Interface,
 }
@@ -74,6 +76,8 @@ pub struct WallTopology {
     pub element_layer: Vec<usize>,
     /// Inner-surface faces: face nodes, then the needle.
     pub faces: Stencils,
+    /// The needle.
+    pub tip: Stencils,
     /// The interface's faces: nodes of the lower side, then those of the upper one in the same order; none without an interface.
     pub interface: Stencils,
     /// For each disc cell, its face's vertices in face-node order.
@@ -94,7 +98,8 @@ impl WallTopology {
         match place {
             Place::Elements => Term { effect, stencils: &self.elements, set: 0 },
             Place::Faces => Term { effect, stencils: &self.faces, set: 1 },
-            Place::Interface => Term { effect, stencils: &self.interface, set: 2 },
+            Place::Tip => Term { effect, stencils: &self.tip, set: 2 },
+            Place::Interface => Term { effect, stencils: &self.interface, set: 3 },
         }
     }
 
@@ -166,7 +171,8 @@ impl WallTopology {
         }
         let fixed = |vertex: usize, _| vertices[vertex].1 == 0 || disc.is_rim(vertices[vertex].0);
         let dofs = Dofs::new(needle + 1, 0..needle, fixed, Some(needle));
-        let mut sets = vec![&elements, &faces];
+        let tip = Stencils { group_size: 1, vertices: vec![needle as u32] };
+        let mut sets = vec![&elements, &faces, &tip];
         if !interface.is_empty() {
             sets.push(&interface);
         }
@@ -178,6 +184,7 @@ impl WallTopology {
             elements,
             element_layer,
             faces,
+            tip,
             interface,
             face_points,
             vertices,

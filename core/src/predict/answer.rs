@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::choice::adhesion::Pull;
 use super::choice::friction::Sliding;
-use super::choice::{Decision, Expected};
+use super::choice::{self, Decision, Expected};
 use super::expected_error::ExpectedError;
 use super::finite_element::{Bench, COARSE, ContactEstimate, FiniteElementAnswer, Problem, Resolution};
 use super::linear::LinearAnswer;
@@ -14,9 +14,10 @@ use super::question::{Begun, Question, Sink};
 use super::topologies::shared_topology;
 use super::types::{ContactReport, ContactState, Level, NeedleOutcome, PredictError, Prediction, SolverReport};
 use super::{PENETRATION_WARNING_MM, Workspace};
-use crate::effects::{adhesion, contact, friction};
-use crate::equilibrium::Solid;
+use crate::effects::puncture::{Burden, Nearest};
+use crate::effects::{adhesion, contact, friction, puncture, tool_flex};
 use crate::equilibrium::settled::Settled;
+use crate::equilibrium::{Solid, Tool};
 use crate::patch::vertex_normals;
 use crate::progress::Progress;
 use crate::solve::newton;
@@ -32,9 +33,7 @@ impl Question<'_> {
         let linear = match self.begin(&self.raised(&sink))? {
             Begun::Pressed(linear) => linear,
             Begun::Still(why) => {
-                let strain = sink.expected_mm / self.yielding_mm();
-                let (sliding, pull) = self.unpressed();
-                let decision = self.decide(Expected { depth_mm: sink.expected_mm, strain, sliding, pull }, &sink)?;
+                let decision = self.decide(self.unpressed(&sink), &sink)?;
                 return Ok(self.at_rest(decision, sink.change_kpa, why));
             }
         };
@@ -57,31 +56,39 @@ impl Question<'_> {
         Ok(self.prediction(self.with_node_penetration(answer), decision, expected))
     }
 
-    /// How a needle slides and pulls that does not press.
-    fn unpressed(&self) -> (Sliding, Pull) {
+    /// What is expected of the effects of a needle that does not press.
+    fn unpressed(&self, sink: &Sink) -> Expected {
         let scene = &self.prepared.scene;
-        let pull = Pull {
-            normal_force_mn: 0.0,
-            depth_mm: scene.tissue.retina_thickness_mm(),
-            strength_kpa: scene.tissue.bond.strength_kpa,
-        };
-        (Sliding { coefficient: scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 }, pull)
+        Expected {
+            depth_mm: sink.expected_mm,
+            strain: sink.expected_mm / self.yielding_mm(),
+            sliding: Sliding { coefficient: scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 },
+            pull: Pull {
+                normal_force_mn: 0.0,
+                depth_mm: scene.tissue.retina_thickness_mm(),
+                strength_kpa: scene.tissue.bond.strength_kpa,
+            },
+            bending: self.bending(None),
+            limits: self.puncture_limits(),
+        }
     }
 
     /// What the linear answer expects of the effects.
     pub(super) fn expected(&self, linear: &LinearAnswer, sink: &Sink) -> Expected {
+        let still = self.unpressed(sink);
         let moved_mm = linear.depth_mm + sink.expected_mm;
-        let (sliding, pull) = self.unpressed();
         let [x, y] = linear.press.touch.parameter;
         Expected {
             depth_mm: moved_mm,
             strain: moved_mm / self.yielding_mm(),
-            sliding: Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding },
+            sliding: Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..still.sliding },
             pull: Pull {
                 normal_force_mn: linear.normal_force_mn,
-                depth_mm: pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
-                ..pull
+                depth_mm: still.pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
+                ..still.pull
             },
+            bending: self.bending(Some(linear)),
+            ..still
         }
     }
 
@@ -89,6 +96,7 @@ impl Question<'_> {
     pub(crate) fn with_node_penetration(&self, mut answer: FiniteElementAnswer) -> FiniteElementAnswer {
         let mut pose = self.tool.patch_from_needle;
         pose.translation.vector += self.motion.direction.into_inner() * answer.travel_mm;
+        pose.translation.vector += answer.deflection.unwrap_or_default();
         let penetration = |(vertex, moved): (&Point3<f64>, &Vector3<f64>)| {
             -self.tool.body.distance(&pose.inverse_transform_point(&(vertex + moved)))
         };
@@ -106,6 +114,7 @@ impl Question<'_> {
         FiniteElementAnswer {
             displacements,
             travel_mm,
+            deflection: None,
             reaction_mn: linear.press.touch.inward.into_inner() * -linear.normal_force_mn,
             contact: ContactReport {
                 state: ContactState::Touching,
@@ -115,25 +124,31 @@ impl Question<'_> {
                 max_strain: strain,
                 slipping_share: None,
                 bond_damage: None,
+                puncture_share: 0.0,
             },
             solver: SolverReport::default(),
-            estimate: self.estimate(linear),
+            estimate: self.estimate(linear, false),
         }
     }
 
     /// Linear surface displacement, fading with depth as the layers share a uniform pressure.
-    pub(crate) fn start<'b>(&self, linear: &'b LinearAnswer) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
+    pub(crate) fn start<'b>(
+        &self,
+        linear: &'b LinearAnswer,
+        bends: bool,
+    ) -> impl Fn([f64; 2], f64) -> Vector3<f64> + 'b {
+        let shift = self.bent(linear, bends).shift;
         let layers = self.prepared.scene.tissue.layers();
         let compliance: Vec<f64> =
             layers.iter().map(|named| named.layer.thickness_mm / named.layer.youngs_modulus_kpa).collect();
         let total: f64 = compliance.iter().sum();
-        move |parameter, depth_in_layers| {
+        move |[x, y], depth_in_layers| {
             let above: f64 = compliance
                 .iter()
                 .enumerate()
                 .map(|(layer, c)| c * (depth_in_layers - layer as f64).clamp(0.0, 1.0))
                 .sum();
-            linear.displacement(parameter) * (1.0 - above / total)
+            linear.displacement([x - shift.x, y - shift.y]) * (1.0 - above / total)
         }
     }
 
@@ -141,7 +156,10 @@ impl Question<'_> {
         Problem {
             patch: self.patch(),
             tissue: &self.prepared.scene.tissue,
-            tool: self.tool,
+            tool: Tool {
+                stiffness_mn_per_mm: self.request.needle.stiffness_mn_per_mm.filter(|_| decision.tool_flex),
+                ..self.tool
+            },
             motion: self.motion,
             solid: decision.solid,
             friction_coefficient: decision.friction.then_some(self.prepared.scene.friction_coefficient),
@@ -168,8 +186,9 @@ impl Question<'_> {
         };
         let mut bench =
             Bench { level: Level::Coarse.name(), resolution: &COARSE, topology: &topology, workspace: solver };
-        let start = self.start(linear);
-        self.problem(decision, change_kpa).solve(&mut bench, &self.estimate(linear), &start, progress)
+        let start = self.start(linear, decision.tool_flex);
+        let estimate = self.estimate(linear, decision.tool_flex);
+        self.problem(decision, change_kpa).solve(&mut bench, &estimate, &start, progress)
     }
 
     /// A finer answer than `coarse`, on a mesh made for the contact that `coarse` finds.
@@ -191,9 +210,9 @@ impl Question<'_> {
         let aim = ContactEstimate {
             center: coarse.estimate.center,
             radius_mm: coarse.estimate.radius_mm,
-            ..self.estimate(linear)
+            ..self.estimate(linear, decision.tool_flex)
         };
-        let start = self.start(linear);
+        let start = self.start(linear, decision.tool_flex);
         let mut answer = self.problem(decision, change_kpa).solve(&mut bench, &aim, &start, progress)?;
         answer.solver.iterations += coarse.solver.iterations;
         Ok(answer)
@@ -202,7 +221,7 @@ impl Question<'_> {
     /// The answer without contact: the surface at rest, or where the pressure moves it.
     pub(crate) fn at_rest(&self, mut decision: Decision, change_kpa: Option<f64>, reason: &str) -> Prediction {
         for report in &mut decision.reports {
-            if [contact::NAME, friction::NAME, adhesion::NAME].contains(&report.name) {
+            if [contact::NAME, friction::NAME, adhesion::NAME, tool_flex::NAME].contains(&report.name) {
                 report.simulated = false;
                 report.reason = reason.to_owned();
             }
@@ -212,6 +231,7 @@ impl Question<'_> {
         let answer = FiniteElementAnswer {
             displacements: self.patch().parameters.iter().map(moved).collect(),
             travel_mm: 0.0,
+            deflection: None,
             reaction_mn: Vector3::zeros(),
             contact: ContactReport {
                 state: ContactState::Clear,
@@ -221,9 +241,16 @@ impl Question<'_> {
                 max_strain: settled.as_ref().map_or(0.0, Settled::max_strain),
                 slipping_share: None,
                 bond_damage: None,
+                puncture_share: 0.0,
             },
             solver: SolverReport::default(),
-            estimate: ContactEstimate { center: [0.0; 2], radius_mm: 0.0, touch_mm: 0.0, travel_mm: 0.0 },
+            estimate: ContactEstimate {
+                center: [0.0; 2],
+                radius_mm: 0.0,
+                touch_mm: 0.0,
+                travel_mm: 0.0,
+                deflection: Vector3::zeros(),
+            },
         };
         let expected = match settled {
             Some(_) => ExpectedError::UNKNOWN,
@@ -233,11 +260,30 @@ impl Question<'_> {
         self.prediction(answer, decision, expected)
     }
 
+    /// Holds the answer against what the tissue bears; what to say if it is more.
+    fn judge(&self, answer: &mut FiniteElementAnswer, decision: &mut Decision) -> Option<String> {
+        let limits = self.puncture_limits();
+        let burden = match answer.contact.state {
+            ContactState::Clear => Burden::default(),
+            _ => Burden { force_mn: answer.reaction_mn.norm(), strain: answer.contact.max_strain },
+        };
+        for report in decision.reports.iter_mut().filter(|report| report.name == puncture::NAME) {
+            *report = choice::puncture::report(&limits, &burden);
+        }
+        let nearest = limits.nearest(&burden);
+        answer.contact.puncture_share = nearest.share();
+        nearest.is_beyond().then(|| {
+            answer.contact.state = ContactState::Punctured;
+            let Nearest { measure, value, limit, .. } = nearest;
+            format!("the tissue is punctured: the {measure} is {value:.4}, beyond {limit:.4}; the surface is that of tissue as if it were still whole")
+        })
+    }
+
     /// The answer in scene coordinates.
     pub(crate) fn prediction(
         &self,
-        answer: FiniteElementAnswer,
-        decision: Decision,
+        mut answer: FiniteElementAnswer,
+        mut decision: Decision,
         expected: ExpectedError,
     ) -> Prediction {
         let patch = self.patch();
@@ -247,6 +293,7 @@ impl Question<'_> {
         let frame = &patch.scene_from_patch;
         let direction = frame * self.motion.direction.into_inner();
         let mut warnings = Vec::new();
+        warnings.extend(self.judge(&mut answer, &mut decision));
         let unused = decision.reports.iter().find(|r| !r.simulated && r.value > r.threshold && r.value.is_some());
         if let Some(effect) = unused {
             warnings.push(format!("`{}` is not simulated though the scene calls for it", effect.name));
@@ -258,6 +305,8 @@ impl Question<'_> {
                 penetration_mm * 1e3
             ));
         }
+        let deflection_mm = answer.deflection.map(|deflection| frame * deflection);
+        let rigid_tip = self.request.needle.tip_mm + direction * answer.travel_mm;
         Prediction {
             vertices: deformed.iter().map(|vertex| frame * vertex).collect(),
             normals: normals.iter().map(|normal| frame * normal).collect(),
@@ -265,8 +314,9 @@ impl Question<'_> {
             displacement_um: answer.displacements.iter().map(|moved| moved.norm() * 1e3).collect(),
             source_indices: patch.source_indices.clone(),
             needle: NeedleOutcome {
-                tip_mm: self.request.needle.tip_mm + direction * answer.travel_mm,
+                tip_mm: deflection_mm.map_or(rigid_tip, |deflection| rigid_tip + deflection),
                 travel_mm: answer.travel_mm,
+                deflection_mm,
                 reaction_mn: frame * answer.reaction_mn,
             },
             contact: answer.contact,

@@ -4,12 +4,16 @@ pub mod adhesion;
 mod criterion;
 pub mod friction;
 pub mod pressure;
+pub mod puncture;
+pub mod tool_flex;
 
 use super::types::{EffectChoice, EffectReport, Level, PredictError};
+use crate::effects::puncture::{Burden, Limits};
 use crate::effects::{self, EFFECT_NAMES, contact, elasticity, finite_strain, inertia, viscoelasticity};
 use crate::equilibrium::Solid;
 use adhesion::Pull;
 use friction::Sliding;
+use tool_flex::Bending;
 
 /// Error that `auto` accepts for leaving an effect out (µm): a tenth of the best published tool-to-layer error (9 µm).
 pub const AUTO_TOLERANCE_UM: f64 = 1.0;
@@ -28,6 +32,8 @@ pub struct Decision {
     pub friction: bool,
     /// Whether the retina can come off.
     pub adhesion: bool,
+    /// Whether the needle's shaft bends.
+    pub tool_flex: bool,
     /// The report, in the order of [`EFFECT_NAMES`].
     pub reports: Vec<EffectReport>,
 }
@@ -43,6 +49,10 @@ pub struct Expected {
     pub sliding: Sliding,
     /// How it pulls at the retina's bond.
     pub pull: Pull,
+    /// What bends the needle's shaft.
+    pub bending: Bending,
+    /// What the tissue bears before it punctures.
+    pub limits: Limits,
 }
 
 /// Decides for `choice` at `level`; `pressure` is what was decided about it before anything was pressed.
@@ -116,9 +126,20 @@ pub fn decide(
         adhesion::report(choice, level, contact, &expected.pull),
         plain(viscoelasticity::NAME, false, STATIC),
         plain(inertia::NAME, false, STATIC),
+        tool_flex::report(choice, level, contact, &expected.bending),
+        puncture::report(
+            &expected.limits,
+            &Burden { force_mn: expected.pull.normal_force_mn, strain: expected.strain },
+        ),
     ];
     let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
     let is_on = |name: &str| reports.iter().any(|report| report.name == name && report.simulated);
-    let (friction, adhesion) = (is_on(effects::friction::NAME), is_on(effects::adhesion::NAME));
-    Ok(Decision { solid, contact, friction, adhesion, reports })
+    Ok(Decision {
+        solid,
+        contact,
+        friction: is_on(effects::friction::NAME),
+        adhesion: is_on(effects::adhesion::NAME),
+        tool_flex: is_on(effects::tool_flex::NAME),
+        reports,
+    })
 }

@@ -1,6 +1,6 @@
 //! The finite-element levels: where the mesh stands, how fine it is, and the solve on it.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use super::types::{ContactReport, ContactState, PredictError, SolverReport};
 use crate::effect::Local;
@@ -36,6 +36,9 @@ pub struct Resolution {
     pub core_per_contact: f64,
     /// Distance from the contact's edge to the fixed rim (mm).
     pub rim_mm: f64,
+    /// How the rings widen outwards: the logarithm of ring i's radius grows as the share of rings within it to this power. 1: all by one ratio; above: fine
+    /// rings at the contact's edge, wide ones at the rim.
+    pub ring_grading: f64,
     /// The contact's numerical parameters.
     pub contact: ContactSettings,
 }
@@ -49,6 +52,7 @@ pub const COARSE: Resolution = Resolution {
     sclera_elements: 0,
     core_per_contact: 0.8,
     rim_mm: 1.5,
+    ring_grading: 1.0,
     contact: ContactSettings { stiffness_kpa_per_mm: 4e4, smoothing_mm: 2e-3, points_per_edge: 5, softening: 1.0 },
 };
 
@@ -61,6 +65,7 @@ pub const REFERENCE: Resolution = Resolution {
     sclera_elements: 1,
     core_per_contact: 1.0,
     rim_mm: 2.0,
+    ring_grading: 1.0,
     contact: ContactSettings { stiffness_kpa_per_mm: 3e5, smoothing_mm: 2e-4, points_per_edge: 4, softening: 10.0 },
 };
 
@@ -99,6 +104,8 @@ pub struct ContactEstimate {
     pub touch_mm: f64,
     /// Travel of the needle at equilibrium (mm).
     pub travel_mm: f64,
+    /// How far the tip then stands aside of a rigid needle's (mm).
+    pub deflection: Vector3<f64>,
 }
 
 /// Thickness of the innermost element of the retina, in contact radii over the number of elements through it.
@@ -113,6 +120,8 @@ pub struct FiniteElementAnswer {
     pub displacements: Vec<Vector3<f64>>,
     /// Travel of the needle (mm).
     pub travel_mm: f64,
+    /// How far the tip stands aside of a rigid needle's (mm), where the shaft bends.
+    pub deflection: Option<Vector3<f64>>,
     /// Force of the tissue on the needle (mN).
     pub reaction_mn: Vector3<f64>,
     /// The contact.
@@ -162,8 +171,12 @@ impl Problem<'_> {
         let contact = estimate.radius_mm.max(SMALLEST_CONTACT * needle_radius);
         let core = resolution.core_per_contact * contact;
         let rim = contact + resolution.rim_mm;
-        let ratio = (rim / core).powf(1.0 / resolution.rings as f64);
-        let radii = (0..=resolution.rings).map(|ring| core * ratio.powi(ring as i32)).collect();
+        let rings = resolution.rings as f64;
+        let ratio = (rim / core).powf(1.0 / rings);
+        // Zero without grading, and then without a trace.
+        let graded = |share: f64| rings * (share.powf(resolution.ring_grading) - share);
+        let radius = |ring: usize| core * ratio.powi(ring as i32) * ratio.powf(graded(ring as f64 / rings));
+        let radii = (0..=resolution.rings).map(radius).collect();
         MeshSize {
             disc: DiscGeometry { center: estimate.center, radii },
             first_element_mm: FIRST_ELEMENT_PER_CONTACT * contact / resolution.retina_elements as f64,
@@ -187,7 +200,7 @@ impl Problem<'_> {
         let wall = self.wall(topology, resolution, &self.mesh(resolution, estimate))?;
         let (motion, touch_mm) = self.aimed(&wall, resolution, estimate);
         let mut positions = wall.displaced(start);
-        wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm));
+        wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm + estimate.deflection));
         progress.stage("equilibrium");
         let pressure = self.pressure_kpa.map(|pressure_kpa| Pressure { pressure_kpa });
         let interface = self.bond.map(|bond| (bond, Interface::new(&topology.interface, &wall.geometry.rest)));
@@ -312,6 +325,7 @@ impl Problem<'_> {
         FiniteElementAnswer {
             displacements: self.patch.parameters.iter().map(node).collect(),
             travel_mm: equilibrium.travel_mm,
+            deflection: equilibrium.deflection,
             reaction_mn: equilibrium.reaction_mn,
             contact: report(&summary, wall.max_strain(&equilibrium.positions)),
             solver: SolverReport {
@@ -325,6 +339,7 @@ impl Problem<'_> {
                 radius_mm: (summary.area_mm2 / std::f64::consts::PI).sqrt(),
                 touch_mm,
                 travel_mm: equilibrium.travel_mm,
+                deflection: equilibrium.deflection.unwrap_or_default(),
             },
         }
     }
@@ -351,10 +366,6 @@ fn report(summary: &ContactSummary, max_strain: f64) -> ContactReport {
         max_strain,
         slipping_share: None,
         bond_damage: None,
+        puncture_share: 0.0,
     }
-}
-
-/// The tip's position at the end of a motion, patch frame.
-pub fn final_tip(tool: &Tool, motion: &Motion, travel_mm: f64) -> Point3<f64> {
-    Point3::from(tool.patch_from_needle.translation.vector + motion.direction.into_inner() * travel_mm)
 }

@@ -1,7 +1,7 @@
 //! The learned levels: the linear answer, or that of `coarse`, with what a network adds to it.
 //!
 //! A network answers for what it was trained on: one layer of retina on choroid and sclera, a rigid needle without friction, the pressure of rest, an intact
-//! bond, finite strain. Anything else is refused by name, and a budget does not choose the level there.
+//! bond, a shaft that does not bend, finite strain. Anything else is refused by name, and a budget does not choose the level there.
 //!
 //! `network` was trained under a given force. For a needle that is held where it is, the force is sought whose travel is the needle's own.
 
@@ -14,7 +14,7 @@ use super::finite_element::{ContactEstimate, FiniteElementAnswer};
 use super::linear::{LinearAnswer, Load, Press};
 use super::question::{Question, Sink};
 use super::types::{ContactReport, ContactState, Level, PredictError, SolverReport};
-use crate::effects::{adhesion, friction, pressure};
+use crate::effects::{adhesion, friction, pressure, tool_flex};
 use crate::network::contact::{Corrected, Memory};
 use crate::network::graph::Graph;
 use crate::network::input::{Answer, Field, Input, TissueNumbers};
@@ -62,6 +62,7 @@ impl Question<'_> {
         let simulated = [
             (decision.friction, friction::NAME),
             (decision.adhesion, adhesion::NAME),
+            (decision.tool_flex, tool_flex::NAME),
             (sink.change_kpa.is_some(), pressure::NAME),
         ];
         if let Some((_, name)) = simulated.into_iter().find(|(on, _)| *on) {
@@ -234,8 +235,9 @@ impl Question<'_> {
             max_strain: strain,
             slipping_share: None,
             bond_damage: None,
+            puncture_share: 0.0,
         };
-        let answer = self.learned(&corrected, contact, SolverReport::default(), self.estimate(linear), force_mn);
+        let answer = self.learned(&corrected, contact, SolverReport::default(), self.estimate(linear, false), force_mn);
         Ok((answer, expected))
     }
 
@@ -287,6 +289,7 @@ impl Question<'_> {
         FiniteElementAnswer {
             displacements: corrected.answer.displacement_mm.iter().map(|moved| moved.cast()).collect(),
             travel_mm,
+            deflection: None,
             reaction_mn,
             contact,
             solver,

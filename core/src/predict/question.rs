@@ -2,13 +2,13 @@
 
 use nalgebra::{Unit, Vector3};
 
-use super::choice::{Decision, Expected, decide, pressure};
+use super::choice::{Decision, Expected, decide, pressure, tool_flex};
 use super::expected_error::Situation;
-use super::finite_element::ContactEstimate;
 use super::linear::{LinearAnswer, Load, Press, press};
 use super::types::{Control, EffectChoice, EffectReport, Level, PredictError, Request};
 use super::{MAX_DEPTH_SHARE, PUNCTURE_PRESSURE_PER_MODULUS, PreparedScene};
 use crate::effects::finite_strain;
+use crate::effects::puncture::Limits;
 use crate::equilibrium::settled::Settled;
 use crate::equilibrium::{Motion, Solid, Tool};
 use crate::needle::Body;
@@ -54,7 +54,7 @@ impl<'a> Question<'a> {
                 Motion { direction: patch_from_needle.rotation * -Vector3::z_axis(), force_mn: None, travel_mm: 0.0 }
             }
         };
-        Question { prepared, request, patch, tool: Tool { body, patch_from_needle }, motion }
+        Question { prepared, request, patch, tool: Tool { body, patch_from_needle, stiffness_mn_per_mm: None }, motion }
     }
 }
 
@@ -106,7 +106,11 @@ impl Question<'_> {
     }
 
     pub(crate) fn situation_under(&self, linear: &LinearAnswer) -> Situation {
-        self.situation(linear.depth_mm, linear.depth_mm / self.yielding_mm(), Some(&linear.press))
+        let mut situation = self.situation(linear.depth_mm, linear.depth_mm / self.yielding_mm(), Some(&linear.press));
+        // Needles were sampled with rigid shafts.
+        let bending = self.bending(Some(linear));
+        situation.sampled &= !tool_flex::report(&self.request.effects, Level::Coarse, true, &bending).simulated;
+        situation
     }
 
     pub(super) fn situation(&self, depth_mm: f64, strain: f64, press: Option<&Press>) -> Situation {
@@ -173,14 +177,21 @@ impl Question<'_> {
         if let Load::Force(force_mn) = press.load {
             let radius_mm = self.tool.body.radius_mm();
             let pressure_kpa = force_mn / (std::f64::consts::PI * radius_mm * radius_mm);
-            let softest = |low: f64, layer: &crate::tissue::Layer| low.min(layer.youngs_modulus_kpa);
-            let modulus = self.prepared.scene.tissue.retina.iter().fold(f64::INFINITY, softest);
-            let limit_kpa = PUNCTURE_PRESSURE_PER_MODULUS * modulus;
+            let limit_kpa = PUNCTURE_PRESSURE_PER_MODULUS * self.prepared.scene.tissue.softest_retina_kpa();
             if pressure_kpa > limit_kpa {
                 return Err(PredictError::BeyondPuncture { force_mn, radius_mm, pressure_kpa, limit_kpa });
             }
         }
         Ok(())
+    }
+
+    /// What the tissue bears under this needle.
+    pub(crate) fn puncture_limits(&self) -> Limits {
+        let Scene { tissue, puncture, .. } = &self.prepared.scene;
+        Limits {
+            force_mn: puncture.force_mn(self.tool.body.radius_mm(), tissue.softest_retina_kpa()),
+            strain: puncture.max_strain,
+        }
     }
 
     pub(super) fn check_depth(&self, linear: &LinearAnswer) -> Result<(), PredictError> {
@@ -189,14 +200,5 @@ impl Question<'_> {
         let limit_mm = MAX_DEPTH_SHARE * (self.yielding_mm() - thinning_mm);
         let depth_mm = linear.depth_mm;
         if depth_mm > limit_mm { Err(PredictError::TooDeep { depth_mm, limit_mm }) } else { Ok(()) }
-    }
-
-    pub(crate) fn estimate(&self, linear: &LinearAnswer) -> ContactEstimate {
-        ContactEstimate {
-            center: linear.center,
-            radius_mm: linear.contact_radius_mm,
-            touch_mm: linear.press.touch.travel_mm,
-            travel_mm: linear.travel_mm(),
-        }
     }
 }

@@ -91,15 +91,19 @@ pub enum ContactState {
     Touching,
     /// They do, and most of the normal force acts where the tissue slides along the needle; told only where friction is simulated.
     Slipping,
+    /// A limit of the tissue is exceeded: what is told is the tissue as if it were still whole.
+    Punctured,
 }
 
 /// Where the needle ends up and what holds it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NeedleOutcome {
-    /// Foremost point (mm).
+    /// Foremost point, the deflection included (mm).
     pub tip_mm: Point3<f64>,
     /// Advance along the force from where it was given (mm); zero under pose control.
     pub travel_mm: f64,
+    /// How far the tip stands aside of a rigid needle's (mm), where the shaft's bending is simulated.
+    pub deflection_mm: Option<Vector3<f64>>,
     /// Force of the tissue on the needle (mN).
     pub reaction_mn: Vector3<f64>,
 }
@@ -121,6 +125,8 @@ pub struct ContactReport {
     pub slipping_share: Option<f64>,
     /// Largest share of the strength that the retina's bond has lost anywhere, 0 intact to 1 parted; where adhesion is simulated.
     pub bond_damage: Option<f64>,
+    /// Force and strain over what the tissue bears, the larger of the two: above 1 it counts as punctured.
+    pub puncture_share: f64,
 }
 
 /// One effect: simulated or not, and why.
@@ -216,9 +222,9 @@ pub enum PredictError {
         /// Largest allowed coordinate (mm).
         limit_mm: f64,
     },
-    /// The force would drive this needle beyond the depth for which the tissue model holds.
+    /// The force would press beyond what the tissue model holds for.
     #[error(
-        "{force_mn} mN on a needle of {radius_mm} mm radius presses the tissue with {pressure_kpa:.1} kPa, beyond the limit of {limit_kpa:.1} kPa for this tissue (puncture)"
+        "{force_mn} mN on a needle of {radius_mm} mm radius presses the tissue with {pressure_kpa:.1} kPa, beyond the {limit_kpa:.1} kPa up to which the model of this tissue holds (puncture)"
     )]
     BeyondPuncture {
         /// Force along the surface normal that the force asks for (mN).

@@ -3,8 +3,6 @@
 //! The start is the state before, moved by the difference of what linear elasticity expects of the two steps: exact for small steps, as good as
 //! a fresh start for large ones. A needle that is held where it was starts from the state before as it is.
 
-use std::f64::consts::PI;
-
 use nalgebra::Vector3;
 
 use super::history::History;
@@ -14,9 +12,8 @@ use crate::equilibrium::{Load, MeshSize, Motion};
 use crate::predict::expected_error::ExpectedError;
 use crate::predict::finite_element::{ContactEstimate, Problem};
 use crate::predict::linear::LinearAnswer;
-use crate::predict::{CutOrGrid, Level, PUNCTURE_PRESSURE_PER_MODULUS, PredictError, Prediction, Question};
+use crate::predict::{ContactState, CutOrGrid, Level, PredictError, Prediction, Question};
 use crate::progress::Progress;
-use crate::tissue::Layer;
 
 /// How far a needle without a force is drawn back along its shaft (mm): nothing of the patch reaches it there.
 const WITHDRAWN_MM: f64 = 100.0;
@@ -45,7 +42,7 @@ impl Simulation<'_> {
         let patch = self.patch.patch().clone();
         let question = Question::new(prepared, &request, &body, CutOrGrid::Grid(&patch));
         let linear = pressed(&question)?;
-        let (prediction, laid) = if self.decision.contact && (linear.is_some() || self.rates.any()) {
+        let (mut prediction, laid) = if self.decision.contact && (linear.is_some() || self.rates.any()) {
             self.solve(&question, linear.as_ref(), step.time_s - self.time_s, progress)?
         } else {
             self.settled = None;
@@ -56,9 +53,25 @@ impl Simulation<'_> {
             };
             (question.at_rest(self.decision.clone(), None, why), false)
         };
-        self.needle.tip_mm = prediction.needle.tip_mm;
+        self.remember_puncture(&mut prediction, step.time_s);
+        // What is handed on is the guide's place, where a needle without a load would be.
+        self.needle.tip_mm = prediction.needle.tip_mm - prediction.needle.deflection_mm.unwrap_or_default();
         self.needle.orientation = request.needle.orientation;
         Ok((prediction, laid))
+    }
+
+    /// Tissue that was punctured stays so: the steps that follow say since when.
+    fn remember_puncture(&mut self, prediction: &mut Prediction, time_s: f64) {
+        match self.punctured {
+            Some((step, time_s)) => {
+                prediction.contact.state = ContactState::Punctured;
+                prediction.warnings.push(format!(
+                    "the tissue is punctured since steps[{step}] at {time_s} s; the surface is that of tissue as if it were still whole"
+                ));
+            }
+            None if prediction.contact.state == ContactState::Punctured => self.punctured = Some((self.next, time_s)),
+            None => {}
+        }
     }
 
     /// Whether the needle is held where the step before left it.
@@ -76,7 +89,7 @@ impl Simulation<'_> {
         problem: &Problem,
         progress: &mut dyn Progress,
     ) -> Result<Aim, PredictError> {
-        let contact = linear.map(|linear| question.estimate(linear));
+        let contact = linear.map(|linear| question.estimate(linear, self.decision.tool_flex));
         let remembers = self.rates.any();
         let fitting = |mesh: &ContactEstimate| contact.as_ref().is_none_or(|contact| fits(mesh, contact));
         let kept = self.laid.clone().filter(|laid| remembers || self.unmoved(question) || fitting(&laid.contact));
@@ -129,10 +142,11 @@ impl Simulation<'_> {
             }
         };
         let mut expected = match linear {
-            Some(linear) => wall.displaced(&question.start(linear)),
+            Some(linear) => wall.displaced(&question.start(linear, self.decision.tool_flex)),
             None => wall.start(),
         };
-        wall.place_tip(&mut expected, &(motion.direction.into_inner() * motion.travel_mm));
+        let deflection = aim.contact.map_or_else(Vector3::zeros, |contact| contact.deflection);
+        wall.place_tip(&mut expected, &(motion.direction.into_inner() * motion.travel_mm + deflection));
         let start = self.start(&expected, &motion, self.unmoved(question));
         progress.stage("equilibrium");
         let level = question.request.level.name();
@@ -150,7 +164,7 @@ impl Simulation<'_> {
         progress.stage("surface");
         let mut answer = problem.answer(&wall, self.resolution, &equilibrium, touch_mm);
         if withdrawn {
-            answer.travel_mm = 0.0;
+            (answer.travel_mm, answer.deflection) = (0.0, None);
         } else {
             answer = question.with_node_penetration(answer);
         }
@@ -163,7 +177,6 @@ impl Simulation<'_> {
         expected_error.calibrated &= self.history.is_none();
         let mut prediction = question.prediction(answer, self.decision.clone(), expected_error);
         prediction.warnings.extend(aim.warnings);
-        prediction.warnings.extend(puncture(question, &prediction));
         Ok((prediction, aim.laid))
     }
 
@@ -188,17 +201,11 @@ impl Simulation<'_> {
     }
 }
 
-/// That the reaction exceeds what a force may be: a needle that is moved fast meets stiffer tissue than the plan, which knows lasting loads.
-fn puncture(question: &Question, prediction: &Prediction) -> Option<String> {
-    let softest = |low: f64, layer: &Layer| low.min(layer.youngs_modulus_kpa);
-    let modulus_kpa = question.prepared.scene().tissue.retina.iter().fold(f64::INFINITY, softest);
-    let limit_kpa = PUNCTURE_PRESSURE_PER_MODULUS * modulus_kpa;
-    let pressure_kpa = prediction.needle.reaction_mn.norm() / (PI * question.tool.body.radius_mm().powi(2));
-    let beyond = question.motion.force_mn.is_none() && pressure_kpa > limit_kpa;
-    beyond.then(|| {
-        format!("the reaction presses the tissue with {pressure_kpa:.1} kPa, beyond the limit of {limit_kpa:.1} kPa for this tissue (puncture)")
-    })
-}
-
 /// Stands for a contact where there is none: the mesh is then laid around the patch's centre.
-const NO_CONTACT: ContactEstimate = ContactEstimate { center: [0.0; 2], radius_mm: 0.1, touch_mm: 0.0, travel_mm: 0.0 };
+const NO_CONTACT: ContactEstimate = ContactEstimate {
+    center: [0.0; 2],
+    radius_mm: 0.1,
+    touch_mm: 0.0,
+    travel_mm: 0.0,
+    deflection: Vector3::new(0.0, 0.0, 0.0),
+};

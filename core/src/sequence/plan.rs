@@ -20,7 +20,7 @@ use crate::solve::newton::NewtonError;
 pub(super) struct Plan {
     /// The contact of each step; `None` where the needle does not press.
     pub contacts: Vec<Option<ContactEstimate>>,
-    /// The deepest contact.
+    /// The deepest contact, and the largest bending of the shaft.
     pub deepest: Expected,
     /// What is decided of the eye's pressure.
     pub pressure: EffectReport,
@@ -158,17 +158,14 @@ pub(super) fn plan<'a>(
     let tissue = &prepared.scene().tissue;
     let pull =
         Pull { normal_force_mn: 0.0, depth_mm: tissue.retina_thickness_mm(), strength_kpa: tissue.bond.strength_kpa };
+    let request = sequence.request(first, &sequence.needle);
+    let question = Question::new(prepared, &request, body, CutOrGrid::Grid(patch.patch()));
+    let (limits, pressure) = (question.puncture_limits(), question.sink().report);
+    let bending = question.bending(None);
     let mut plan = Plan {
         contacts: Vec::with_capacity(sequence.steps.len()),
-        deepest: Expected { depth_mm: 0.0, strain: 0.0, sliding, pull },
-        pressure: Question::new(
-            prepared,
-            &sequence.request(first, &sequence.needle),
-            body,
-            CutOrGrid::Grid(patch.patch()),
-        )
-        .sink()
-        .report,
+        deepest: Expected { depth_mm: 0.0, strain: 0.0, sliding, pull, bending, limits },
+        pressure,
         fastest_change_s: f64::INFINITY,
     };
     let mut needle = sequence.needle;
@@ -192,15 +189,20 @@ pub(super) fn plan<'a>(
                 let strain = linear.depth_mm / question.yielding_mm();
                 let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
                 let pull = Pull { normal_force_mn: linear.normal_force_mn, ..pull };
-                plan.deepest = Expected { depth_mm: linear.depth_mm, strain, sliding, pull };
+                let bending = plan.deepest.bending;
+                plan.deepest = Expected { depth_mm: linear.depth_mm, strain, sliding, pull, bending, limits };
             }
+        }
+        let bending = question.bending(linear.as_ref());
+        if bending.across_mn > plan.deepest.bending.across_mn {
+            plan.deepest.bending = bending;
         }
         let load = linear.as_ref().map(|linear| (linear.depth_mm, linear.center));
         if load != load_before {
             plan.fastest_change_s = plan.fastest_change_s.min(step.time_s - before_s);
         }
         (before_s, load_before) = (step.time_s, load);
-        plan.contacts.push(linear.as_ref().map(|linear| question.estimate(linear)));
+        plan.contacts.push(linear.as_ref().map(|linear| question.estimate(linear, false)));
     }
     Ok((patch, plan))
 }

@@ -1,9 +1,12 @@
 //! Newton's method for the free unknowns and at most one driven vertex.
 //!
 //! Sought is a stationary point of Π(x, s) = Σ energies − F s over the free positions x and, under force control, the travel s of the
-//! driven vertex along a unit direction d. Each step factorises the Hessian of the free part; the travel is eliminated by the bordering
-//! method (two right-hand sides, one factor). Where the Hessian is not positive definite it is changed until it is, and only then
+//! driven vertex along a unit direction d; it may have more freedom ([`Drive`]). Each step factorises the Hessian of the free part; the driven vertex is eliminated by the bordering
+//! method (`border.rs`: one factor, a right-hand side more for each direction). Where the Hessian is not positive definite it is changed until it is, and only then
 //! (projecting always would cost the quadratic convergence of nearly incompressible elements).
+//!
+//! Near the end the Hessian hardly changes any more: there the last factor is used again for as long as it pays (chord steps), at a fraction of the cost
+//! of a new one.
 //!
 //! How a step is used, and kept from going astray, is [`Globalization`]'s business (`globalization.rs`).
 //!
@@ -14,26 +17,14 @@ use std::ops::AddAssign;
 use nalgebra::Vector3;
 use thiserror::Error;
 
+pub use super::border::Drive;
+use super::border::Reduced;
 pub use super::globalization::Globalization;
 use super::globalization::{Step, Trial};
 use super::sparse::{Factor, LinearSolveError, SymbolicFactor, norm};
 use crate::assemble::{Dofs, Pattern, Scratch, energy, gradient};
 use crate::effect::Term;
 use crate::progress::Progress;
-
-/// How the driven vertex moves.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Drive {
-    /// It stays where it is.
-    Held,
-    /// It moves along the unit vector `direction` until the resisting force along it equals `force_mn`.
-    Force {
-        /// Unit direction of travel.
-        direction: Vector3<f64>,
-        /// Force along it (mN).
-        force_mn: f64,
-    },
-}
 
 /// How to solve and when to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,6 +44,11 @@ pub struct NewtonSettings {
     pub held_iterations: usize,
 }
 
+/// Residual over force scale below which chord steps are tried: the contact has found its points.
+const CHORD_BELOW: f64 = 1e-3;
+/// A chord step must bring the residual down to this share: it costs a fifth to a quarter of an iteration, of which few are left here.
+const CHORD_REDUCTION: f64 = 0.2;
+
 /// What a converged solve cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NewtonReport {
@@ -60,6 +56,8 @@ pub struct NewtonReport {
     pub iterations: usize,
     /// Step halvings in the line search.
     pub halvings: usize,
+    /// Chord steps: solves with the factor of an iteration before.
+    pub chords: usize,
     /// Factorisations repeated because the Hessian was not positive definite.
     pub shifts: usize,
     /// Residual force at the end (mN).
@@ -71,6 +69,7 @@ impl AddAssign for NewtonReport {
     fn add_assign(&mut self, next: Self) {
         self.iterations += next.iterations;
         self.halvings += next.halvings;
+        self.chords += next.chords;
         self.shifts += next.shifts;
         self.residual_mn = next.residual_mn;
     }
@@ -167,9 +166,8 @@ impl Workspace {
 impl System<'_> {
     pub(super) fn potential(&self, positions: &[f64], start: &[f64], drive: Drive, scratch: &mut Scratch) -> f64 {
         let mut total = energy(self.terms, positions, scratch);
-        if let (Drive::Force { direction, force_mn }, Some(vertex)) = (drive, self.driven) {
-            let travel: f64 = (0..3).map(|k| (positions[3 * vertex + k] - start[3 * vertex + k]) * direction[k]).sum();
-            total -= force_mn * travel;
+        if let Some(vertex) = self.driven {
+            total -= drive.work(&Vector3::from_fn(|k, _| positions[3 * vertex + k] - start[3 * vertex + k]));
         }
         if !self.dead_load.is_empty() {
             for at in 0..positions.len() {
@@ -189,13 +187,8 @@ impl System<'_> {
         for (r, load) in workspace.residual.iter_mut().zip(self.dead_load) {
             *r -= load;
         }
-        let along = match drive {
-            Drive::Held => 0.0,
-            Drive::Force { direction, force_mn } => {
-                Vector3::from_row_slice(&workspace.residual[free..]).dot(&direction) - force_mn
-            }
-        };
-        norm(&workspace.residual[..free]).hypot(along)
+        let along = drive.out_of_balance(&Vector3::from_row_slice(&workspace.residual[free..]));
+        along.into_iter().fold(norm(&workspace.residual[..free]), f64::hypot)
     }
 
     /// Solves for equilibrium from `positions`, which hold the answer on success.
@@ -238,8 +231,37 @@ impl System<'_> {
             let (halvings, residual_mn) = taken.ok_or(stuck)?;
             report.halvings += halvings;
             report.residual_mn = residual_mn;
+            while report.residual_mn > settings.tolerance_mn
+                && report.residual_mn < CHORD_BELOW * settings.force_scale_mn
+                && self.chord(positions, drive, settings, &mut report, workspace)?
+            {}
         }
         Ok(report)
+    }
+
+    /// A step with the factor at hand, kept if it brings the residual down enough; whether it did.
+    fn chord(
+        &self,
+        positions: &mut [f64],
+        drive: Drive,
+        settings: &NewtonSettings,
+        report: &mut NewtonReport,
+        workspace: &mut Workspace,
+    ) -> Result<bool, NewtonError> {
+        let before = positions.to_vec();
+        let (step, _) = self.step(drive, settings.max_travel_mm, workspace)?;
+        self.dofs.advance(positions, &step, 1.0);
+        let residual_mn = self.residual(positions, drive, workspace);
+        report.chords += 1;
+        // Not a number is not smaller either.
+        let pays = residual_mn <= CHORD_REDUCTION * report.residual_mn;
+        if pays {
+            report.residual_mn = residual_mn;
+        } else {
+            positions.copy_from_slice(&before);
+            report.residual_mn = self.residual(positions, drive, workspace);
+        }
+        Ok(pays)
     }
 
     /// The Newton step (free unknowns, then the border), the travel limited, and the slope of the potential along it.
@@ -251,43 +273,40 @@ impl System<'_> {
     ) -> Result<(Vec<f64>, f64), NewtonError> {
         let free = self.dofs.free;
         let residual = &workspace.residual;
-        let mut step: Vec<f64> = residual[..free].iter().map(|r| -r).collect();
-        let mut travel = 0.0;
-        let mut out_of_balance = 0.0;
-        match drive {
-            Drive::Held => {
-                workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut step)?;
-            }
-            Drive::Force { direction, force_mn } => {
-                let stored = self.pattern.stored();
-                let border = &workspace.values[stored..];
-                let coupling: Vec<f64> =
-                    (0..free).map(|i| (0..3).map(|k| border[k * free + i] * direction[k]).sum()).collect();
-                let corner = &border[3 * free..];
+        let directions: Vec<Vector3<f64>> = drive.directions().into_iter().map(|(direction, _)| direction).collect();
+        let out_of_balance = drive.out_of_balance(&Vector3::from_row_slice(&residual[free..]));
+        let border = &workspace.values[self.pattern.stored()..];
+        let corner = &border[3 * free..];
+        let mut columns: Vec<f64> = residual[..free].iter().map(|r| -r).collect();
+        for direction in &directions {
+            columns.extend((0..free).map(|i| (0..3).map(|k| border[k * free + i] * direction[k]).sum::<f64>()));
+        }
+        let couplings = columns[free..].to_vec();
+        let coupling = |direction: usize| &couplings[direction * free..(direction + 1) * free];
+        workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut columns)?;
+        let (alone, responses) = columns.split_at(free);
+        let response = |direction: usize| &responses[direction * free..(direction + 1) * free];
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let mut reduced = Reduced { directions: &directions, stiffness: Vec::new(), drive: Vec::new() };
+        for (row, along) in directions.iter().enumerate() {
+            for (column, other) in directions.iter().enumerate() {
                 let own: f64 = (0..3)
                     .flat_map(|i| (0..3).map(move |j| (i, j)))
-                    .map(|(i, j)| direction[i] * direction[j] * corner[3 * i.max(j) + i.min(j)])
+                    .map(|(i, j)| along[i] * other[j] * corner[3 * i.max(j) + i.min(j)])
                     .sum();
-                out_of_balance = Vector3::from_row_slice(&residual[free..]).dot(&direction) - force_mn;
-                let mut columns = step;
-                columns.extend_from_slice(&coupling);
-                workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut columns)?;
-                let (alone, response) = columns.split_at(free);
-                let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-                let stiffness = own - dot(&coupling, response);
-                let drive = -out_of_balance - dot(&coupling, alone);
-                // Without stiffness (no contact yet, or past a limit point) only the sign of the drive is known.
-                travel = if stiffness > 0.0 { drive / stiffness } else { drive.signum() * max_travel_mm };
-                travel = travel.clamp(-max_travel_mm, max_travel_mm);
-                step = alone.iter().zip(response).map(|(a, r)| a - travel * r).collect();
+                reduced.stiffness.push(own - dot(coupling(row), response(column)));
             }
+            reduced.drive.push(-out_of_balance[row] - dot(coupling(row), alone));
+        }
+        let travels = reduced.solve(max_travel_mm);
+        let mut step = alone.to_vec();
+        for (direction, travel) in travels.iter().enumerate() {
+            step.iter_mut().zip(response(direction)).for_each(|(s, r)| *s -= travel * r);
         }
         let slope =
-            step.iter().zip(&workspace.residual[..free]).map(|(s, r)| s * r).sum::<f64>() + travel * out_of_balance;
-        match drive {
-            Drive::Held => step.extend_from_slice(&[0.0; 3]),
-            Drive::Force { direction, .. } => step.extend((direction * travel).iter()),
-        }
+            step.iter().zip(&residual[..free]).map(|(s, r)| s * r).sum::<f64>() + dot(&travels, &out_of_balance);
+        let moved: Vector3<f64> = directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
+        step.extend(moved.iter());
         Ok((step, slope.min(0.0)))
     }
 

@@ -55,7 +55,8 @@ kinds! {
     OutsidePatch = "outside-patch", UNPROCESSABLE_ENTITY, "The needle meets the tissue outside of the patch",
         "The contact must lie on the patch: move the needle's tip, or the scene's pose, or give a larger mesh.";
     BeyondPuncture = "beyond-puncture", UNPROCESSABLE_ENTITY, "The force would puncture the tissue",
-        "The tissue model holds up to a pressure under the needle. Use a smaller force or a thicker needle.";
+        "The tissue model holds up to a pressure under the needle. Use a smaller force or a thicker needle. What punctures earlier, by \
+         scene.puncture, is answered, and says so.";
     TooDeep = "too-deep", UNPROCESSABLE_ENTITY, "The needle stands too deep in the tissue",
         "Under pose control the needle may be pressed in no deeper than the tissue model holds.";
     InvalidMesh = "invalid-mesh", UNPROCESSABLE_ENTITY, "The surface cannot be used",

@@ -32,7 +32,7 @@ fn wire_field(field: &str) -> String {
         return format!("scene.pose.position_mm{index}");
     }
     match field.split(['.', '[']).next() {
-        Some("surface" | "tissue" | "friction_coefficient" | "pressure_kpa" | "rest_pressure_kpa") => {
+        Some("surface" | "tissue" | "friction_coefficient" | "pressure_kpa" | "rest_pressure_kpa" | "puncture") => {
             format!("scene.{field}")
         }
         Some("scene_from_patch") => "scene.pose.orientation_xyzw".to_owned(),

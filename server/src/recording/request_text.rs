@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 
 use nalgebra::Vector3;
 use retina_core::needle::Tip;
+use retina_core::needle::shaft::STIFFNESS;
 use retina_core::predict::{Control, Level, Prediction, Request};
 use serde_json::{Value, json};
 
@@ -129,12 +130,14 @@ fn request_json(scene: &str, request: &Request) -> String {
     let tip_mm = request.needle.tip_mm.coords;
     let orientation: [f64; 4] = request.needle.orientation.coords.into();
     format!(
-        "{{\"scene\": {},\n \"needle\": {{\"tip_mm\": {},\n  \"orientation_xyzw\": {},\n  \"radius_mm\": {}, \"tip\": {tip}}},\n \
+        "{{\"scene\": {},\n \"needle\": {{\"tip_mm\": {},\n  \"orientation_xyzw\": {},\n  \"radius_mm\": {}, \"stiffness_mn_per_mm\": {}, \"tip\": {tip}}},\n \
          \"{}\": {},\n \"accuracy\": {{\"level\": \"{}\"}}}}",
         json!(scene),
         numbers(tip_mm),
         json!(orientation),
         shape.radius_mm,
+        // On the wire a rigid shaft is one of the largest stiffness.
+        request.needle.stiffness_mn_per_mm.unwrap_or(STIFFNESS.max),
         force.0,
         force.1,
         request.level.name()

@@ -1,11 +1,12 @@
 //! The needle of a request.
 
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
+use retina_core::needle::shaft::stiffness_mn_per_mm;
 use retina_core::needle::shape::{BEVEL_ANGLE, EDGE_FRACTION_OF_RADIUS};
 use retina_core::needle::{Gauge, Needle, NeedleShape, Tip, orientation_pointing};
 use serde_json::json;
 
-use super::{DEFAULT_GAUGE, rotation, unknown_name};
+use super::{DEFAULT_GAUGE, both, rotation, unknown_name};
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::{Quaternion, Vector};
 use crate::wire::request::{BevelledTip, FlatTip, NeedleSpec, TipName, TipShape, TipSpec};
@@ -20,7 +21,8 @@ pub(super) fn needle(spec: &NeedleSpec) -> Result<Needle, Problem> {
     let tip_mm = Point3::from(spec.tip_mm.0);
     let orientation = orientation("needle", spec.orientation_xyzw.as_ref(), spec.direction.as_ref())?
         .unwrap_or_else(|| orientation_pointing(&-Vector3::z_axis()));
-    let needle = Needle { shape, tip_mm, orientation };
+    let stiffness = spec.stiffness_mn_per_mm.unwrap_or_else(|| stiffness_mn_per_mm(radius_mm));
+    let needle = Needle { shape, tip_mm, orientation, stiffness_mn_per_mm: Some(stiffness) };
     needle.validate().map_err(|error| from_out_of_range(tip_field(&error.field, &shape), &error))?;
     Ok(needle)
 }
@@ -101,14 +103,4 @@ fn tip_field(field: &str, shape: &NeedleShape) -> String {
         (Some(number), Tip::Bevelled { .. }) => format!("needle.tip.bevelled.{number}"),
         _ => field.to_owned(),
     }
-}
-
-fn both(field: &str, other: &str) -> Problem {
-    Problem::field(
-        Kind::InvalidRequest,
-        field,
-        None,
-        format!("left out when {other} is given"),
-        format!("{field} and {other} exclude each other"),
-    )
 }

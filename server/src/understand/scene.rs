@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
+use retina_core::scene::puncture::{Puncture, PunctureForce};
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::mesh_file::{MeshFormat, read_mesh};
 use retina_core::surface::{EYE_RADIUS, MeshError, PIT_DEPTH, PIT_SIGMA, TriangleMesh};
@@ -11,12 +12,13 @@ use retina_core::tissue::ranges::{CHOROID, INNER_LIMITING_MEMBRANE, LayerRanges,
 use retina_core::tissue::rate::{PronyTerm, RateProperties};
 use retina_core::tissue::{Layer, RetinalBond, Tissue};
 
-use super::{DEFAULT_SCENE, rotation, unknown_name};
+use super::{DEFAULT_SCENE, both, rotation, unknown_name};
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::{Triangle, Vector};
 use crate::wire::request::SceneChoice;
 use crate::wire::scene::{
-    BondSpec, LayerSpec, PoseSpec, PronyTermSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec, TissueSpec,
+    BondSpec, LayerSpec, PoseSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind,
+    SurfaceSpec, TissueSpec,
 };
 
 /// Name of every scene that is written out.
@@ -59,6 +61,7 @@ pub fn scene(spec: &SceneSpec) -> Result<Scene, Problem> {
         friction_coefficient: spec.friction_coefficient.unwrap_or(FRICTION_COEFFICIENT.default),
         pressure_kpa: spec.pressure_kpa.unwrap_or(EYE_PRESSURE.default),
         rest_pressure_kpa: spec.rest_pressure_kpa.unwrap_or(EYE_PRESSURE.default),
+        puncture: puncture(&spec.puncture.unwrap_or_default())?,
     };
     scene.validate().map_err(|error| from_out_of_range(field(&error.field, spec), &error))?;
     Ok(scene)
@@ -183,6 +186,19 @@ fn bond(spec: &BondSpec) -> RetinalBond {
         strength_kpa: spec.strength_kpa.unwrap_or(default.strength_kpa),
         fracture_energy_mn_per_mm: spec.fracture_energy_mn_per_mm.unwrap_or(default.fracture_energy_mn_per_mm),
     }
+}
+
+fn puncture(spec: &PunctureSpec) -> Result<Puncture, Problem> {
+    let default = Puncture::default();
+    let force = match (spec.pressure_per_modulus, spec.max_force_mn) {
+        (Some(_), Some(_)) => {
+            return Err(both("scene.puncture.max_force_mn", "scene.puncture.pressure_per_modulus"));
+        }
+        (Some(share), None) => PunctureForce::PressurePerModulus(share),
+        (None, Some(force_mn)) => PunctureForce::Force(force_mn),
+        (None, None) => default.force,
+    };
+    Ok(Puncture { force, max_strain: spec.max_strain.unwrap_or(default.max_strain) })
 }
 
 fn rate(spec: &RateSpec) -> RateProperties {

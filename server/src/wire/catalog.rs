@@ -95,6 +95,8 @@ pub struct GaugeEntry {
     pub outer_diameter_mm: f64,
     /// Where the diameter comes from.
     pub source: &'static str,
+    /// Force across the shaft that moves the tip by 1 mm, mN/mm: the value of `needle.stiffness_mn_per_mm` when left out.
+    pub stiffness_mn_per_mm: f64,
 }
 
 /// `GET /healthz` and `GET /readyz`.

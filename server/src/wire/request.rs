@@ -64,6 +64,9 @@ pub struct NeedleSpec {
     pub gauge: Option<String>,
     /// Radius of the shaft in place of a gauge, mm.
     pub radius_mm: Option<f64>,
+    /// Force across the shaft that moves the tip by 1 mm, where the shaft bends, mN/mm, 1 to 1000000 (rigid); that of the gauge (see `GET /v1/gauges`)
+    /// or of the radius when left out.
+    pub stiffness_mn_per_mm: Option<f64>,
     /// How the needle ends; `hemispherical` when left out.
     pub tip: Option<TipSpec>,
 }

@@ -57,10 +57,13 @@ pub struct SurfaceAnswer<'a> {
 /// The needle at equilibrium.
 #[derive(Serialize, ToSchema)]
 pub struct NeedleAnswer {
-    /// Foremost point, scene frame, mm.
+    /// Foremost point, scene frame, mm; the deflection is in it.
     pub tip_mm: Vector,
     /// Advance along the force from where the needle was given, mm; zero under pose control.
     pub travel_mm: f64,
+    /// How far the tip stands aside of where a rigid needle's would, scene frame, mm; told where `tool_flex` is simulated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deflection_mm: Option<Vector>,
     /// Force of the tissue on the needle, scene frame, mN.
     pub reaction_mn: Vector,
 }
@@ -84,6 +87,8 @@ pub struct ContactAnswer {
     /// Largest share of the strength that the retina's bond has lost anywhere, 0 intact to 1 parted; told where `adhesion` is simulated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bond_damage: Option<f64>,
+    /// Force under the needle and strain over the limits of `scene.puncture`, the larger of the two: above 1 the tissue counts as punctured.
+    pub puncture_share: f64,
 }
 
 /// Whether needle and retina touch.
@@ -96,6 +101,8 @@ pub enum ContactWord {
     Touching,
     /// They do, and most of the normal force acts where the tissue slides along the needle.
     Slipping,
+    /// A limit of `scene.puncture` is exceeded, now or in a step before: what is told is the tissue as if it were still whole.
+    Punctured,
 }
 
 /// How accurate the answer is.
@@ -202,6 +209,7 @@ impl From<&NeedleOutcome> for NeedleAnswer {
         Self {
             tip_mm: Vector(needle.tip_mm.coords.into()),
             travel_mm: needle.travel_mm,
+            deflection_mm: needle.deflection_mm.map(|deflection| Vector(deflection.into())),
             reaction_mn: Vector(needle.reaction_mn.into()),
         }
     }
@@ -214,6 +222,7 @@ impl From<&ContactReport> for ContactAnswer {
                 ContactState::Clear => ContactWord::Clear,
                 ContactState::Touching => ContactWord::Touching,
                 ContactState::Slipping => ContactWord::Slipping,
+                ContactState::Punctured => ContactWord::Punctured,
             },
             area_mm2: contact.area_mm2,
             max_strain: contact.max_strain,
@@ -221,6 +230,7 @@ impl From<&ContactReport> for ContactAnswer {
             max_penetration_um: contact.max_penetration_mm * 1e3,
             slipping_share: contact.slipping_share,
             bond_damage: contact.bond_damage,
+            puncture_share: contact.puncture_share,
         }
     }
 }

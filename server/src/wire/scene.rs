@@ -31,6 +31,24 @@ pub struct SceneSpec {
     /// Pressure in the eye when the surface was measured, kPa, 0 to 8; 2.07 when left out. The difference of the two presses on the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rest_pressure_kpa: Option<f64>,
+    /// Where the tissue punctures; the limits of the tissue model when left out.
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
+    pub puncture: Option<PunctureSpec>,
+}
+
+/// Where the tissue punctures: an answer beyond a limit says so, by its contact's state. A number left out is the default.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PunctureSpec {
+    /// Force over the needle's cross-section, in Young's moduli of the softest retina, 0.005 to 0.75; 0.75 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pressure_per_modulus: Option<f64>,
+    /// Force under the needle, mN, 0.001 to 100; in place of `pressure_per_modulus`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_force_mn: Option<f64>,
+    /// Largest principal stretch less one, in magnitude, 0.01 to 5; 1 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_strain: Option<f64>,
 }
 
 /// What a surface is.

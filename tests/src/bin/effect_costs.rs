@@ -7,7 +7,8 @@ use std::time::Instant;
 
 use nalgebra::{Point3, Unit, Vector3};
 use retina_core::comparison::{node_errors_um, quantile};
-use retina_core::effects::{adhesion, contact, elasticity, finite_strain, friction, pressure};
+use retina_core::effects::{adhesion, contact, elasticity, finite_strain, friction, pressure, tool_flex};
+use retina_core::needle::shaft::STIFFNESS;
 use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::{Control, EffectChoice, Level, PredictError, Prediction, PreparedScene, Request, Workspace};
 use retina_core::progress::Silent;
@@ -28,7 +29,7 @@ struct Case {
     without: &'static [&'static str],
 }
 
-const CASES: [Case; 4] = [
+const CASES: [Case; 5] = [
     Case {
         effect: finite_strain::NAME,
         what: "the default scene",
@@ -51,6 +52,12 @@ const CASES: [Case; 4] = [
         effect: adhesion::NAME,
         what: "a bond of 1 kPa",
         change: |scene| scene.tissue.bond.strength_kpa = 1.0,
+        without: &[finite_strain::NAME, contact::NAME],
+    },
+    Case {
+        effect: tool_flex::NAME,
+        what: "a 25G shaft of 67 mN/mm",
+        change: |_| {},
         without: &[finite_strain::NAME, contact::NAME],
     },
 ];
@@ -102,10 +109,11 @@ fn main() -> Result<(), PredictError> {
 
 fn request(effects: EffectChoice) -> Request {
     let force = Vector3::from(FORCE_MN);
-    let needle = Needle::pointing(
+    let mut needle = Needle::pointing(
         NeedleShape::hemispherical(RADIUS_MM),
         Point3::new(0.0, 0.0, 0.1),
         &Unit::new_normalize(force),
     );
+    needle.stiffness_mn_per_mm = Some(STIFFNESS.default);
     Request { needle, control: Control::Force(force), level: Level::Coarse, effects }
 }

@@ -60,7 +60,7 @@ impl Press {
     /// Calls `see(wall, equilibrium)` after each motion (travel or force), each from the last one's answer.
     fn follow(&self, motions: &[(Option<f64>, f64)], mut see: impl FnMut(&Wall, &Equilibrium, usize)) {
         let body = self.shape.body();
-        let tool = Tool { body: &body, patch_from_needle: Isometry3::identity() };
+        let tool = Tool { body: &body, patch_from_needle: Isometry3::identity(), stiffness_mn_per_mm: None };
         let mesh = MeshSize { disc: self.disc.clone(), first_element_mm: f64::INFINITY };
         let wall = Wall::new(&self.topology, &Surface::Flat, &self.tissue, &mesh, self.solid, self.contact, tool)
             .expect("a wall");

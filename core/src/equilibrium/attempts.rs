@@ -1,0 +1,182 @@
+//! How an equilibrium is reached: directly from a good start if it can be, by load steps if it must.
+//!
+//! Not here: the repetition that friction needs (`friction`), Newton's method itself (`solve`).
+
+use nalgebra::Vector3;
+
+use super::{ContactSettings, Equilibrium, Load, Motion, Wall};
+use crate::mesh::wall::Place;
+use crate::progress::Progress;
+use crate::solve::newton::{
+    Drive, Globalization, NewtonError, NewtonReport, NewtonSettings, System, Workspace, holding_force,
+};
+
+/// One way to reach an equilibrium.
+pub(super) struct Attempt {
+    load_steps: usize,
+    globalization: Globalization,
+    /// Newton iterations for each load step.
+    max_iterations: usize,
+}
+
+/// Residual relative to the force scale at which Newton stops.
+pub(super) const RELATIVE_TOLERANCE: f64 = 1e-7;
+/// The same in the first solve of a softened contact.
+const SOFTENED_TOLERANCE: f64 = 1e-3;
+/// Force scale under pose control (mN): that of a light touch.
+const POSE_FORCE_SCALE_MN: f64 = 0.01;
+/// Smallest force scale (mN): below it rounding of the tissue's stresses decides.
+const SMALLEST_FORCE_MN: f64 = 1e-7;
+/// The same in a wall under pressure, over the force of the pressure on the whole surface.
+const SMALLEST_FORCE_SHARE: f64 = 1e-5;
+/// What is tried, in this order: directly from the given start, then from first touch in load steps.
+pub(super) const ATTEMPTS: [Attempt; 4] = [
+    Attempt { load_steps: 1, globalization: Globalization::PredictedStress, max_iterations: 45 },
+    Attempt { load_steps: 4, globalization: Globalization::PredictedStress, max_iterations: 30 },
+    Attempt { load_steps: 8, globalization: Globalization::PredictedStress, max_iterations: 30 },
+    Attempt { load_steps: 12, globalization: Globalization::LineSearch, max_iterations: 100 },
+];
+/// Iterations of all attempts together: what takes more is a sharp edge that cuts its way in, where no load path of this model ends.
+const MOST_ITERATIONS: usize = 120;
+/// Iterations in which the needle waits for the tissue.
+const HELD_ITERATIONS: usize = 1;
+/// Share of the remaining way by which the needle overlaps the tissue at the start of load steps.
+const FIRST_OVERLAP: f64 = 0.05;
+/// Largest travel in one Newton iteration, in needle radii.
+const MAX_TRAVEL_PER_RADIUS: f64 = 0.25;
+
+impl Wall<'_> {
+    /// Finds the equilibrium under `load` from the start `positions` (tissue and tip).
+    ///
+    /// # Errors
+    /// The failure of the last attempt.
+    pub fn solve(
+        &self,
+        load: &Load,
+        positions: Vec<f64>,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Equilibrium, NewtonError> {
+        let mut start = Some(positions);
+        let mut spent = 0;
+        let mut failure = NewtonError::Interrupted { iterations: 0 };
+        for attempt in &ATTEMPTS {
+            if spent >= MOST_ITERATIONS {
+                break;
+            }
+            let positions = start.take().unwrap_or_else(|| self.touching(load));
+            match self.follow(load, attempt, positions, &mut spent, workspace, progress) {
+                Ok(mut equilibrium) => {
+                    equilibrium.newton.iterations = spent;
+                    return Ok(equilibrium);
+                }
+                Err(stop @ NewtonError::Interrupted { .. }) => return Err(stop),
+                Err(error) => failure = error,
+            }
+        }
+        if let NewtonError::NotConverged { iterations, .. } = &mut failure {
+            *iterations = spent;
+        }
+        Err(failure)
+    }
+
+    /// The tissue at rest and the needle just overlapping it.
+    fn touching(&self, load: &Load) -> Vec<f64> {
+        let Load { motion, touch_mm, .. } = *load;
+        let mut positions = self.start();
+        let overlap = FIRST_OVERLAP * (motion.travel_mm - touch_mm).max(0.0) + 2.0 * self.contact.smoothing_mm;
+        self.place_tip(&mut positions, &(motion.direction.into_inner() * (touch_mm + overlap)));
+        positions
+    }
+
+    /// Follows equal load steps to the whole motion, with a softened contact if there is one, and ends with the contact proper.
+    fn follow(
+        &self,
+        load: &Load,
+        attempt: &Attempt,
+        mut positions: Vec<f64>,
+        spent: &mut usize,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Equilibrium, NewtonError> {
+        let Load { motion, touch_mm, .. } = *load;
+        let softened = self.contact.softened();
+        let mut total = NewtonReport::default();
+        for step in 1..=attempt.load_steps {
+            let share = step as f64 / attempt.load_steps as f64;
+            if motion.force_mn.is_none() {
+                self.hold_at(&mut positions, motion, touch_mm + share * (motion.travel_mm - touch_mm));
+            }
+            let drive = self.drive(motion, share);
+            if self.contact.softening > 1.0 {
+                let drive = (drive, SOFTENED_TOLERANCE);
+                total += self.newton(&softened, drive, load, attempt, &mut positions, spent, workspace, progress)?;
+            }
+            if self.contact.softening <= 1.0 || step == attempt.load_steps {
+                let drive = (drive, RELATIVE_TOLERANCE);
+                total +=
+                    self.newton(&self.contact, drive, load, attempt, &mut positions, spent, workspace, progress)?;
+            }
+        }
+        Ok(self.equilibrium(motion, positions, total, attempt.load_steps, workspace))
+    }
+
+    /// One Newton solve with this contact, to the given tolerance relative to the force scale.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn newton(
+        &self,
+        contact: &ContactSettings,
+        (drive, tolerance): (Drive, f64),
+        load: &Load,
+        attempt: &Attempt,
+        positions: &mut [f64],
+        spent: &mut usize,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<NewtonReport, NewtonError> {
+        let solid = self.solid();
+        let contact = self.contact_with(contact);
+        let flex = self.flex(load.motion);
+        let mut terms =
+            vec![self.topology.term(Place::Elements, solid.as_ref()), self.topology.term(Place::Faces, &contact)];
+        terms.extend(flex.iter().map(|flex| self.topology.term(Place::Tip, flex)));
+        terms.extend(load.additions.iter().map(|addition| self.topology.term(addition.place, addition.effect)));
+        let system = System {
+            terms: &terms,
+            dofs: &self.topology.dofs,
+            pattern: &self.topology.pattern,
+            symbolic: &self.topology.symbolic,
+            driven: Some(self.topology.needle()),
+            dead_load: &[],
+        };
+        let smallest = SMALLEST_FORCE_MN.max(SMALLEST_FORCE_SHARE * self.pressure_force_mn);
+        let scale = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN).max(smallest);
+        let settings = NewtonSettings {
+            globalization: attempt.globalization,
+            force_scale_mn: scale,
+            tolerance_mn: tolerance * scale,
+            max_iterations: attempt.max_iterations.min(MOST_ITERATIONS.saturating_sub(*spent)),
+            held_iterations: HELD_ITERATIONS,
+            max_travel_mm: MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
+        };
+        let solved = system.solve(positions, drive, &settings, workspace, progress);
+        *spent += solved.as_ref().map_or_else(NewtonError::iterations, |report| report.iterations);
+        solved
+    }
+
+    pub(super) fn equilibrium(
+        &self,
+        motion: &Motion,
+        positions: Vec<f64>,
+        newton: NewtonReport,
+        load_steps: usize,
+        workspace: &Workspace,
+    ) -> Equilibrium {
+        let (travel_mm, deflection) = self.ended(&positions, motion);
+        let tip = Vector3::from_row_slice(&positions[3 * self.topology.needle()..]);
+        // What holds the tip is the guide and, where it bends, the shaft.
+        let shaft = self.flex(motion).map_or_else(Vector3::zeros, |flex| flex.force_on_guide(&tip));
+        let reaction_mn = shaft - holding_force(workspace);
+        Equilibrium { positions, travel_mm, deflection, reaction_mn, newton, load_steps }
+    }
+}

@@ -1,0 +1,113 @@
+//! How fine the truth is, and how far it may be from level `reference`.
+//!
+//! What `reference` costs is the factorisation of its matrix; what its answer hangs on is the nine cells under the contact and the first rings around
+//! it. The truth keeps these and saves on the rest. [`compare`] measures what that changes, on paths of their own seed, and [`error_mm`] states it.
+
+use retina_core::comparison::quantile;
+use retina_core::equilibrium::ContactSettings;
+use retina_core::needle::Tip;
+use retina_core::predict::finite_element::{REFERENCE, Resolution};
+use retina_core::predict::{PredictError, PreparedScene};
+
+use super::draw::{STEPS, plan};
+use super::path::{Path, PathMemory};
+use crate::sample::Sample;
+
+/// The truth's mesh: that of `reference` with eight rings in place of twelve, graded towards the contact, two elements through the retina in place of three, and
+/// a rigid sclera. A step that starts from the one before needs no softened approach.
+pub const TRUTH: Resolution =
+    Resolution { rings: 8, ring_grading: 1.25, retina_elements: 2, sclera_elements: 0, ..UNSOFTENED };
+
+/// `reference` without that approach, which leads to the same equilibrium.
+const UNSOFTENED: Resolution =
+    Resolution { contact: ContactSettings { softening: 1.0, ..REFERENCE.contact }, ..REFERENCE };
+
+/// Its name, in the manifest.
+pub const NAME: &str = "disc-3-8-2-graded";
+
+/// Names of the tips, in the order of [`TipShape::kind`](crate::sample::TipShape::kind).
+pub const TIPS: [&str; 3] = ["half ball", "flat", "bevelled"];
+
+/// Where the estimated error comes from.
+pub const ERROR_BASIS: &str = "none";
+
+/// Estimated error of the truth's worst node (mm).
+pub fn error_mm(_sample: &Sample) -> f32 {
+    0.0
+}
+
+/// The truth of one step held against `reference`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Comparison {
+    /// Number of the tip among [`TIPS`].
+    pub tip: usize,
+    /// Distance of the worst node (µm).
+    pub worst_um: f64,
+    /// Largest displacement of a node (µm).
+    pub largest_um: f64,
+    /// Difference of the forces over the force.
+    pub force: f64,
+}
+
+/// Holds the truth against the mesh of `reference` on path number `path` of `seed`, step by step, until one of the two finds no equilibrium.
+///
+/// # Errors
+/// If the path's scene cannot be prepared.
+pub fn compare(seed: u64, path: u32, scenes: &[u8]) -> Result<Vec<Comparison>, PredictError> {
+    let mut comparisons = Vec::new();
+    let Some(plan) = plan(seed, path, scenes) else { return Ok(comparisons) };
+    let prepared = PreparedScene::new(plan.scene.clone())?;
+    let tip = match plan.needle.shape.tip {
+        Tip::Hemispherical => 0,
+        Tip::Flat { .. } => 1,
+        Tip::Bevelled { .. } => 2,
+    };
+    let meshes = [TRUTH, UNSOFTENED].map(|mesh| Path::new(&plan, &prepared, mesh));
+    let [Ok(mut truth), Ok(mut reference)] = meshes else { return Ok(comparisons) };
+    let mut memories = [PathMemory::default(), PathMemory::default()];
+    for step in 0..STEPS {
+        let ours = truth.truth(step, &mut memories[0]);
+        let theirs = reference.truth(step, &mut memories[1]);
+        let (Ok(ours), Ok(theirs)) = (ours, theirs) else { break };
+        let pairs = ours.displacements.iter().zip(&theirs.displacements);
+        let along = |reaction: &nalgebra::Vector3<f64>| -reaction.dot(&plan.direction);
+        comparisons.push(Comparison {
+            tip,
+            worst_um: 1e3 * pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max),
+            largest_um: 1e3 * theirs.displacements.iter().map(|moved| moved.norm()).fold(0.0, f64::max),
+            force: along(&ours.reaction_mn) / along(&theirs.reaction_mn) - 1.0,
+        });
+    }
+    Ok(comparisons)
+}
+
+/// The table of many comparisons, as Markdown.
+pub fn table(comparisons: &[Comparison]) -> String {
+    let mut text = String::from(
+        "| tip | samples | worst node µm: median | 95 % | max | % of the largest displacement: median | 95 % | beyond 1 µm and 1 % | force off by %: median | 95 % |\n|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for (name, tips) in [("all", 0..3)].into_iter().chain(TIPS.iter().enumerate().map(|(i, tip)| (*tip, i..i + 1))) {
+        let of: Vec<&Comparison> = comparisons.iter().filter(|c| tips.contains(&c.tip)).collect();
+        if of.is_empty() {
+            continue;
+        }
+        let numbers = |number: fn(&Comparison) -> f64| of.iter().map(|c| number(c)).collect::<Vec<f64>>();
+        let worst = numbers(|c| c.worst_um);
+        let share = numbers(|c| 100.0 * c.worst_um / c.largest_um);
+        let force = numbers(|c| 100.0 * c.force.abs());
+        let beyond = of.iter().filter(|c| c.worst_um > (0.01 * c.largest_um).max(1.0)).count();
+        text += &format!(
+            "| {name} | {} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} | {:.0} % | {:.2} | {:.2} |\n",
+            of.len(),
+            quantile(&worst, 0.5),
+            quantile(&worst, 0.95),
+            quantile(&worst, 1.0),
+            quantile(&share, 0.5),
+            quantile(&share, 0.95),
+            100.0 * beyond as f64 / of.len() as f64,
+            quantile(&force, 0.5),
+            quantile(&force, 0.95)
+        );
+    }
+    text
+}
