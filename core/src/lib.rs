@@ -12,6 +12,7 @@ pub mod equilibrium;
 pub mod layered;
 pub mod mesh;
 pub mod needle;
+pub mod network;
 pub mod patch;
 pub mod predict;
 pub mod progress;

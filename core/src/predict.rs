@@ -2,7 +2,8 @@
 //!
 //! [`PreparedScene`] holds what depends on the scene alone; [`Workspace`] is a thread's memory. Read on in `types` (what goes in and comes
 //! out), `question` (a request in the patch's frame), `answer` (level by level), `linear` (the layered answer, start of all others),
-//! `finite_element` (the levels on meshes), `choice` (effects), `budget` and `expected_error` (levels), `indentation` (many steps of one needle). Not here: HTTP, clocks, threads.
+//! `finite_element` (the levels on meshes), `networks` and `learned` (the learned levels), `choice` (effects), `budget` and `expected_error` (levels),
+//! `indentation` (many steps of one needle). Not here: HTTP, clocks, threads.
 
 mod answer;
 pub mod beds;
@@ -13,7 +14,9 @@ pub mod choice;
 pub mod expected_error;
 pub mod finite_element;
 pub mod indentation;
+mod learned;
 pub mod linear;
+pub mod networks;
 mod question;
 pub(crate) mod topologies;
 pub mod types;
@@ -26,6 +29,7 @@ use nalgebra::Point3;
 
 use crate::mesh::wall::WallTopology;
 use crate::needle::Body;
+use crate::network::contact::Memory;
 use crate::patch::Patch;
 use crate::progress::Progress;
 use crate::scene::puncture::PRESSURE_PER_MODULUS;
@@ -35,7 +39,9 @@ use beds::Beds;
 use budget::{Budget, Choice, LevelTimes};
 use expected_error::Situation;
 use finite_element::{COARSE, REFERENCE, Resolution};
+use learned::RestPatch;
 use linear::press;
+use networks::Networks;
 use question::Begun;
 pub(crate) use question::{CutOrGrid, Question};
 
@@ -55,12 +61,16 @@ pub struct PreparedScene {
     beds: Beds,
     /// The patch, where it does not depend on the contact.
     patch: Option<Patch>,
+    /// What the networks need of it.
+    rest: Option<RestPatch>,
+    networks: Arc<Networks>,
 }
 
 /// A thread's memory, reused between predictions.
 #[derive(Default)]
 pub struct Workspace {
     coarse: Option<(Arc<WallTopology>, newton::Workspace)>,
+    network: Memory,
 }
 
 impl PreparedScene {
@@ -69,12 +79,21 @@ impl PreparedScene {
     /// # Errors
     /// [`PredictError::OutOfRange`] naming the field.
     pub fn new(scene: Scene) -> Result<Self, PredictError> {
+        Self::with_networks(scene, Networks::shipped())
+    }
+
+    /// As [`PreparedScene::new`], with other networks.
+    ///
+    /// # Errors
+    /// [`PredictError::OutOfRange`] naming the field.
+    pub fn with_networks(scene: Scene, networks: Arc<Networks>) -> Result<Self, PredictError> {
         scene.validate()?;
         let patch = match scene.surface {
             SceneSurface::Mesh(_) => None,
             _ => Some(scene.patch(&Point3::origin())?),
         };
-        Ok(PreparedScene { beds: Beds::new(&scene), scene, patch })
+        let rest = patch.as_ref().map(RestPatch::new);
+        Ok(PreparedScene { beds: Beds::new(&scene), scene, patch, rest, networks })
     }
 
     /// The scene.
@@ -136,9 +155,18 @@ impl PreparedScene {
     pub fn situation(&self, request: &Request) -> Result<Situation, PredictError> {
         let body = request.needle.shape.body();
         let question = self.aimed(request, &body)?;
-        Ok(match question.begin(&question.raised(&question.sink()))? {
+        let sink = question.sink();
+        Ok(match question.begin(&question.raised(&sink))? {
             Begun::Still(_) => question.situation(0.0, 0.0, None),
-            Begun::Pressed(linear) => question.situation_under(&linear),
+            Begun::Pressed(linear) => {
+                let expected = question.expected(&linear, &sink);
+                let error = |level| question.learned_error(level, &linear, expected, &sink);
+                Situation {
+                    network: error(Level::Network),
+                    corrected: error(Level::Corrected),
+                    ..question.situation_under(&linear)
+                }
+            }
         })
     }
 

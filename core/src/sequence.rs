@@ -194,7 +194,7 @@ impl<'a> Simulation<'a> {
         resolution: Option<&'a Resolution>,
         progress: &mut dyn Progress,
     ) -> Result<Self, SequenceError> {
-        if sequence.level == Level::Linear {
+        if sequence.level == Level::Linear || sequence.level.is_learned() {
             return Err(SequenceError::Level { level: sequence.level.name() });
         }
         progress.stage("plan");

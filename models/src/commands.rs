@@ -2,4 +2,6 @@
 
 pub mod dataset;
 pub mod deformcontact;
+pub mod evaluate;
+pub mod train;
 pub mod truth_error;

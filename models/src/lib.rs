@@ -4,6 +4,12 @@
 //! they are made).
 
 pub mod commands;
+pub mod contact;
+pub mod data;
 pub mod dataset;
+pub mod describe;
+pub mod evaluate;
+pub mod faithful;
 pub mod sample;
 pub mod shard;
+pub mod train;

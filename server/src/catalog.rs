@@ -49,6 +49,10 @@ pub fn levels() -> LevelList {
             Level::Linear => {
                 ("layered linear elasticity and a contact law, prepared once per scene", "tens of microseconds")
             }
+            Level::Network => {
+                ("the linear answer with what a network learned that it lacks", "tenths of a millisecond")
+            }
+            Level::Corrected => ("`coarse` with what a network learned about its error", "milliseconds"),
             Level::Coarse => ("finite elements on a mesh that fits in milliseconds", "milliseconds"),
             Level::Reference => ("finite elements on the converged mesh", "seconds"),
         };

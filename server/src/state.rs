@@ -173,7 +173,8 @@ fn prepare_built_in(scenes: &Scenes, times: &Times, workspace: &mut Workspace) -
     let needle = Needle::pointing(shape, Point3::origin(), &-Vector3::z_axis());
     for name in Scene::built_in_names() {
         let scene = scenes.get(Some(&SceneChoice::Name((*name).to_owned())))?;
-        for level in [Level::Linear, Level::Coarse] {
+        for level in Level::ALL.into_iter().filter(|level| *level != Level::Reference) {
+            let optional = level.is_learned();
             let request = Request {
                 needle,
                 control: Control::Force(Vector3::new(0.0, 0.0, -WARM_UP_FORCE_MN)),
@@ -182,7 +183,11 @@ fn prepare_built_in(scenes: &Scenes, times: &Times, workspace: &mut Workspace) -
             };
             let budget = Budget { level: Some(level), ..Budget::default() };
             let mut stopwatch = Stopwatch::start(Instant::now(), WARM_UP_LIMIT, &|| false);
-            predict(&scene, Question { request, budget, times }, workspace, &mut stopwatch, Layout::Compact)?;
+            let warm = predict(&scene, Question { request, budget, times }, workspace, &mut stopwatch, Layout::Compact);
+            // Without usable weights a learned level has no answer; the others do.
+            if let (Err(problem), false) = (warm, optional) {
+                return Err(problem);
+            }
         }
     }
     Ok(())

@@ -15,7 +15,7 @@ const REMEMBERED: usize = 100;
 /// Predictions of a level from which on the first guess is forgotten.
 const ENOUGH: usize = 20;
 /// First guesses, ms, in the order of [`Level::ALL`]; (unverified) about twice what a 2.5 GHz core takes.
-const FIRST_GUESS_MS: LevelTimes = [0.3, 25.0, 10_000.0];
+const FIRST_GUESS_MS: LevelTimes = [0.3, 1.0, 25.0, 26.0, 10_000.0];
 
 /// The last predictions' times.
 #[derive(Debug, Default)]

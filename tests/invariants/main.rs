@@ -1,13 +1,14 @@
 //! Laws that every answer keeps, whatever its numbers: equilibrium, exact zeros, rigid motion, relabelling, symmetry, repeatability.
 //!
 //! Contract: laws are checked through [`PreparedScene::predict`](retina_core::predict::PreparedScene::predict) at levels `linear` and
-//! `coarse`, in a few cases at `reference`, which takes seconds. Every law has a paired negative: what must change the answer does.
+//! `coarse` (`learned`: at the learned levels), in a few cases at `reference`, which takes seconds. Every law has a paired negative: what must change the answer does.
 //!
 //! Not here: values (`verification`), errors (`accuracy`).
 
 mod effects;
 mod equilibrium;
 mod frames;
+mod learned;
 mod puncture;
 mod refusals;
 mod repeatability;

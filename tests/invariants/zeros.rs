@@ -1,7 +1,9 @@
 //! No force, no contact: nothing moves, exactly.
 
 use nalgebra::{Point3, Vector3};
-use retina_core::predict::{ContactState, Control, EffectChoice, Level, Prediction, PreparedScene, Request};
+use retina_core::predict::{
+    ContactState, Control, EffectChoice, Level, PredictError, Prediction, PreparedScene, Request,
+};
 use retina_core::scene::Scene;
 
 use crate::support::{ask, at, built_in, cap, largest_um, mesh_scene, straight};
@@ -53,6 +55,11 @@ fn a_held_needle_above_the_surface_moves_nothing_and_one_below_does() {
                 continue;
             }
             held.needle.tip_mm.z = -0.02;
+            if level == Level::Corrected {
+                let refusal = ask(&scene, &held);
+                assert!(matches!(refusal, Err(PredictError::NotLearned { field: "control", .. })), "{refusal:?}");
+                continue;
+            }
             let answer = ask(&scene, &held).unwrap();
             assert_eq!(answer.contact.state, ContactState::Touching);
             assert!(largest_um(&answer) > 0.5 && answer.needle.reaction_mn.z > 1e-3);

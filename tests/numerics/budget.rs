@@ -2,15 +2,29 @@
 
 use retina_core::needle::NeedleShape;
 use retina_core::predict::budget::{Budget, DEFAULT_LEVEL, LevelTimes};
-use retina_core::predict::expected_error::Situation;
+use retina_core::predict::expected_error::{ExpectedError, Situation};
 use retina_core::predict::{Level, PredictError};
 use retina_core::scene::Scene;
 
-const TIMES_MS: LevelTimes = [0.1, 12.0, 3000.0];
+const TIMES_MS: LevelTimes = [0.1, 0.5, 12.0, 12.5, 3000.0];
 
 fn pressed() -> Situation {
     let scene = Scene::built_in("macula").unwrap();
-    Situation::new(&scene, &NeedleShape::hemispherical(0.257), 20.0, 0.06, 0.15)
+    let situation = Situation::new(&scene, &NeedleShape::hemispherical(0.257), 20.0, 0.06, 0.15);
+    // Between the levels around them.
+    let between = |a: Level, b: Level| {
+        let [a, b] = [a, b].map(|level| situation.expected_error(level));
+        ExpectedError {
+            median_um: (a.median_um * b.median_um).sqrt(),
+            p95_um: (a.p95_um * b.p95_um).sqrt(),
+            calibrated: true,
+        }
+    };
+    Situation {
+        network: Some(between(Level::Linear, Level::Coarse)),
+        corrected: Some(between(Level::Coarse, Level::Reference)),
+        ..situation
+    }
 }
 
 fn choose(budget: Budget) -> (Level, usize) {
@@ -27,7 +41,7 @@ fn nothing_promised_is_the_default_level() {
 fn an_error_asks_for_the_cheapest_level_that_keeps_it() {
     let errors = Level::ALL.map(|level| pressed().expected_error(level));
     assert!(errors.iter().all(|error| error.calibrated && error.median_um < error.p95_um), "{errors:?}");
-    assert!(errors[0].p95_um > errors[1].p95_um && errors[1].p95_um > errors[2].p95_um, "{errors:?}");
+    assert!(errors.is_sorted_by(|a, b| a.p95_um > b.p95_um), "{errors:?}");
     for (level, error) in Level::ALL.iter().zip(&errors) {
         let asking = |um| choose(Budget { max_error_um: Some(um), ..Budget::default() });
         assert_eq!(asking(error.p95_um), (*level, 0));
@@ -39,7 +53,9 @@ fn an_error_asks_for_the_cheapest_level_that_keeps_it() {
 fn a_time_asks_for_the_most_accurate_level_in_it() {
     let asking = |ms| choose(Budget { max_time_ms: Some(ms), ..Budget::default() });
     assert_eq!(asking(5000.0), (Level::Reference, 0));
-    assert_eq!(asking(2999.0), (Level::Coarse, 0));
+    assert_eq!(asking(2999.0), (Level::Corrected, 0));
+    assert_eq!(asking(12.2), (Level::Coarse, 0));
+    assert_eq!(asking(0.6), (Level::Network, 0));
     assert_eq!(asking(0.1), (Level::Linear, 0));
     assert_eq!(asking(0.05), (Level::Linear, 1));
 }
@@ -47,11 +63,27 @@ fn a_time_asks_for_the_most_accurate_level_in_it() {
 #[test]
 fn what_cannot_be_kept_is_said_or_refused() {
     let both = Budget { max_error_um: Some(0.51), max_time_ms: Some(1.0), ..Budget::default() };
-    assert_eq!(choose(both), (Level::Linear, 1));
+    assert_eq!(choose(both), (Level::Network, 1));
     let refused = Budget { strict: true, ..both }.choose(&pressed(), &TIMES_MS);
     assert!(matches!(refused, Err(PredictError::Budget { .. })), "{refused:?}");
     let fixed = Budget { level: Some(Level::Coarse), ..both };
     assert_eq!(choose(fixed), (Level::Coarse, 2));
+}
+
+#[test]
+fn a_level_without_an_answer_is_not_chosen() {
+    let without = Situation { network: None, corrected: None, ..pressed() };
+    let choose = |budget: Budget| budget.choose(&without, &TIMES_MS).unwrap().level;
+    for ms in [0.6, 12.6] {
+        let chosen = choose(Budget { max_time_ms: Some(ms), ..Budget::default() });
+        assert!(!chosen.is_learned(), "{chosen:?} in {ms} ms");
+    }
+    for level in [Level::Network, Level::Corrected] {
+        let um = pressed().expected_error(level).p95_um;
+        assert!(!choose(Budget { max_error_um: Some(um), ..Budget::default() }).is_learned());
+        // Asked for by name it is taken at its word, and refuses by itself.
+        assert_eq!(choose(Budget { level: Some(level), ..Budget::default() }), level);
+    }
 }
 
 #[test]

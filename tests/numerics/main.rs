@@ -11,6 +11,7 @@ mod mesh;
 mod mesh_file;
 mod meshes;
 mod needle;
+mod network;
 mod patch;
 mod scene;
 mod shaft;

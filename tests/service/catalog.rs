@@ -73,7 +73,7 @@ fn the_lists_name_what_requests_may_name() {
     let levels = get("/v1/levels").body;
     let names: Vec<&str> =
         levels["levels"].as_array().expect("levels").iter().filter_map(|level| level["name"].as_str()).collect();
-    assert_eq!(names, ["linear", "coarse", "reference"]);
+    assert_eq!(names, ["linear", "network", "coarse", "corrected", "reference"]);
     let gauges = get("/v1/gauges").body;
     for gauge in gauges["gauges"].as_array().expect("gauges") {
         let request = crate::harness::with(request("linear"), "/needle/gauge", gauge["name"].clone());

@@ -30,46 +30,68 @@ impl Question<'_> {
         progress: &mut dyn Progress,
     ) -> Result<Prediction, PredictError> {
         let sink = self.sink();
-        let sliding = Sliding { coefficient: self.prepared.scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
-        let pull = Pull {
-            normal_force_mn: 0.0,
-            depth_mm: self.prepared.scene.tissue.retina_thickness_mm(),
-            strength_kpa: self.prepared.scene.tissue.bond.strength_kpa,
-        };
-        let limits = self.puncture_limits();
         let linear = match self.begin(&self.raised(&sink))? {
             Begun::Pressed(linear) => linear,
             Begun::Still(why) => {
-                let strain = sink.expected_mm / self.yielding_mm();
-                let bending = self.bending(None);
-                let expected = Expected { depth_mm: sink.expected_mm, strain, sliding, pull, bending, limits };
-                let decision = self.decide(expected, &sink)?;
+                let decision = self.decide(self.unpressed(&sink), &sink)?;
                 return Ok(self.at_rest(decision, sink.change_kpa, why));
             }
         };
         let strain = linear.depth_mm / self.yielding_mm();
-        let moved_mm = linear.depth_mm + sink.expected_mm;
-        let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
-        let [x, y] = linear.press.touch.parameter;
-        let pull = Pull {
-            normal_force_mn: linear.normal_force_mn,
-            depth_mm: pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
-            ..pull
-        };
-        let strain_moved = moved_mm / self.yielding_mm();
-        let bending = self.bending(Some(&linear));
-        let expected = Expected { depth_mm: moved_mm, strain: strain_moved, sliding, pull, bending, limits };
+        let expected = self.expected(&linear, &sink);
         let decision = self.decide(expected, &sink)?;
         if !decision.contact {
             return Ok(self.at_rest(decision, sink.change_kpa, "contact is not simulated"));
         }
-        let answer = match self.request.level {
-            Level::Linear => self.linear(&linear, strain, &sink),
-            Level::Coarse => self.coarse(resolution, &linear, &decision, sink.change_kpa, workspace, progress)?,
-            Level::Reference => self.fine(resolution, &linear, &decision, sink.change_kpa, workspace, progress)?,
+        let of_level = || self.situation_under(&linear).expected_error(self.request.level);
+        let (answer, expected) = match self.request.level {
+            Level::Linear => (self.linear(&linear, strain, &sink), of_level()),
+            Level::Network => self.by_network(&linear, strain, &decision, &sink, workspace, progress)?,
+            Level::Coarse => {
+                (self.coarse(resolution, &linear, &decision, sink.change_kpa, workspace, progress)?, of_level())
+            }
+            Level::Corrected => self.by_correction(&linear, &decision, &sink, workspace, progress)?,
+            Level::Reference => {
+                (self.fine(resolution, &linear, &decision, sink.change_kpa, workspace, progress)?, of_level())
+            }
         };
-        let expected = self.situation_under(&linear).expected_error(self.request.level);
         Ok(self.prediction(self.with_node_penetration(answer), decision, expected))
+    }
+
+    /// What is expected of the effects of a needle that does not press.
+    fn unpressed(&self, sink: &Sink) -> Expected {
+        let scene = &self.prepared.scene;
+        Expected {
+            depth_mm: sink.expected_mm,
+            strain: sink.expected_mm / self.yielding_mm(),
+            sliding: Sliding { coefficient: scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 },
+            pull: Pull {
+                normal_force_mn: 0.0,
+                depth_mm: scene.tissue.retina_thickness_mm(),
+                strength_kpa: scene.tissue.bond.strength_kpa,
+            },
+            bending: self.bending(None),
+            limits: self.puncture_limits(),
+        }
+    }
+
+    /// What the linear answer expects of the effects.
+    pub(super) fn expected(&self, linear: &LinearAnswer, sink: &Sink) -> Expected {
+        let still = self.unpressed(sink);
+        let moved_mm = linear.depth_mm + sink.expected_mm;
+        let [x, y] = linear.press.touch.parameter;
+        Expected {
+            depth_mm: moved_mm,
+            strain: moved_mm / self.yielding_mm(),
+            sliding: Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..still.sliding },
+            pull: Pull {
+                normal_force_mn: linear.normal_force_mn,
+                depth_mm: still.pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
+                ..still.pull
+            },
+            bending: self.bending(Some(linear)),
+            ..still
+        }
     }
 
     /// Adds to the reported penetration that of the patch's own nodes: a coarse face may cut a sharp edge between its quadrature points.

@@ -42,21 +42,26 @@ impl Budget {
     /// # Errors
     /// [`PredictError::Budget`] where no level keeps the promises and the budget is strict.
     pub fn choose(&self, situation: &Situation, times_ms: &LevelTimes) -> Result<Choice, PredictError> {
-        let entries =
+        let all =
             || Level::ALL.into_iter().zip(*times_ms).map(|(level, ms)| (level, ms, situation.expected_error(level)));
+        let entries = || all().filter(|(level, ..)| situation.has(*level));
         let in_time = |ms: f64| self.max_time_ms.is_none_or(|most| ms <= most);
         let exact = |error: &ExpectedError| self.max_error_um.is_none_or(|most| error.p95_um <= most);
-        let latest_in_time = || entries().rfind(|(_, ms, _)| in_time(*ms));
+        // Of two that are equally good, or of neither of which anything is known, the dearer.
+        let best_in_time = || {
+            let in_time = entries().filter(|(_, ms, _)| in_time(*ms));
+            in_time.reduce(|best, next| if next.2.p95_um <= best.2.p95_um { next } else { best })
+        };
         let cheapest = || entries().next();
         let (level, ms, error) = match (self.level, self.max_error_um, self.max_time_ms) {
-            (Some(level), ..) => entries().find(|(entry, ..)| *entry == level),
+            (Some(level), ..) => all().find(|(entry, ..)| *entry == level),
             (None, None, None) => entries().find(|(entry, ..)| *entry == DEFAULT_LEVEL),
-            (None, None, Some(_)) => latest_in_time().or_else(cheapest),
+            (None, None, Some(_)) => best_in_time().or_else(cheapest),
             (None, Some(_), _) => {
-                entries().find(|(_, ms, error)| in_time(*ms) && exact(error)).or_else(latest_in_time).or_else(cheapest)
+                entries().find(|(_, ms, error)| in_time(*ms) && exact(error)).or_else(best_in_time).or_else(cheapest)
             }
         }
-        .unwrap_or((DEFAULT_LEVEL, times_ms[1], situation.expected_error(DEFAULT_LEVEL)));
+        .unwrap_or((DEFAULT_LEVEL, f64::INFINITY, situation.expected_error(DEFAULT_LEVEL)));
         let mut broken = Vec::new();
         if let Some(most) = self.max_error_um.filter(|_| !exact(&error)) {
             let why = if error.p95_um.is_finite() {

@@ -85,10 +85,15 @@ pub fn decide(
         }
     };
     let possible = level != Level::Linear;
-    let finite = wanted && possible;
+    if level.is_learned() && contact && !wanted && why.is_some() {
+        let problem = format!("is part of what level `{}` learned and cannot be left out", level.name());
+        return Err(PredictError::Effect { name: finite_strain::NAME.to_owned(), problem });
+    }
+    let finite = (wanted || level.is_learned()) && possible;
     let reason = match (why, possible) {
         (_, false) => "level `linear` is small-strain by construction".to_owned(),
         (Some(why), _) => why.to_owned(),
+        (None, _) if level.is_learned() && !called_for => format!("part of what level `{}` learned", level.name()),
         (None, _) if called_for => {
             "the linear answer's strain times its depth exceeds what may be neglected [µm]".to_owned()
         }

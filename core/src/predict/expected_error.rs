@@ -49,6 +49,10 @@ pub struct Situation {
     pub strain: f64,
     /// Whether needles, poses and tissues like this one were sampled.
     pub sampled: bool,
+    /// What level `network` expects of its own answer; `None` where it has none.
+    pub network: Option<ExpectedError>,
+    /// The same of level `corrected`.
+    pub corrected: Option<ExpectedError>,
 }
 
 /// The expected error of the worst node of the patch.
@@ -90,7 +94,14 @@ impl Situation {
             && (thin_mm..=thick_mm).contains(&shape.radius_mm)
             && default_tip
             && angle_deg <= CALIBRATED_ANGLE_DEG;
-        Situation { edged: shape.tip != Tip::Hemispherical, depth_um: depth_mm * 1e3, strain, sampled }
+        Situation {
+            edged: shape.tip != Tip::Hemispherical,
+            depth_um: depth_mm * 1e3,
+            strain,
+            sampled,
+            network: None,
+            corrected: None,
+        }
     }
 
     /// The expected error of `level` here.
@@ -102,6 +113,8 @@ impl Situation {
         let table = match level {
             Level::Linear => &LINEAR,
             Level::Coarse => &COARSE,
+            Level::Network => return self.network.unwrap_or(ExpectedError::UNKNOWN),
+            Level::Corrected => return self.corrected.unwrap_or(ExpectedError::UNKNOWN),
             Level::Reference => {
                 let bound = REFERENCE_ERROR_UM.max(REFERENCE_SHARE * self.depth_um);
                 return ExpectedError {
@@ -112,12 +125,22 @@ impl Situation {
             }
         };
         let quantiles = &table[usize::from(self.edged)][bin(self.strain)];
+        let (median_um, p95_um) = (quantiles.median * self.depth_um, quantiles.p95 * self.depth_um);
+        self.with_reference_error(median_um, p95_um, self.sampled && quantiles.p95.is_finite())
+    }
+
+    /// An error against level `reference` as one against the truth: what was compared with has an error itself.
+    pub fn with_reference_error(&self, median_um: f64, p95_um: f64, calibrated: bool) -> ExpectedError {
         let own = self.expected_error(Level::Reference);
-        // The truth that was compared with has an error itself.
-        ExpectedError {
-            median_um: (quantiles.median * self.depth_um).hypot(own.median_um),
-            p95_um: quantiles.p95 * self.depth_um + own.p95_um,
-            calibrated: self.sampled && quantiles.p95.is_finite(),
+        ExpectedError { median_um: median_um.hypot(own.median_um), p95_um: p95_um + own.p95_um, calibrated }
+    }
+
+    /// Whether `level` has an answer here, as far as that is known.
+    pub fn has(&self, level: Level) -> bool {
+        match level {
+            Level::Network => self.depth_um == 0.0 || self.network.is_some(),
+            Level::Corrected => self.depth_um == 0.0 || self.corrected.is_some(),
+            Level::Linear | Level::Coarse | Level::Reference => true,
         }
     }
 }

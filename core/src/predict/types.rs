@@ -7,6 +7,7 @@ use super::expected_error::ExpectedError;
 use crate::equilibrium::friction::FrictionError;
 use crate::mesh::wall::WallError;
 use crate::needle::Needle;
+use crate::network::weights::WeightsError;
 use crate::patch::PatchError;
 use crate::range::OutOfRange;
 use crate::solve::newton::NewtonError;
@@ -16,21 +17,32 @@ use crate::solve::newton::NewtonError;
 pub enum Level {
     /// Layered linear elasticity and an axisymmetric contact law, prepared once per scene: tens of microseconds.
     Linear,
+    /// The linear answer with what a network learned that it lacks: a few tenths of a millisecond.
+    Network,
     /// Finite elements on a mesh that fits in milliseconds.
     Coarse,
+    /// `Coarse` with what a network learned about its error.
+    Corrected,
     /// Finite elements on the converged mesh: seconds.
     Reference,
 }
 
 impl Level {
     /// Every level, cheapest first.
-    pub const ALL: [Level; 3] = [Level::Linear, Level::Coarse, Level::Reference];
+    pub const ALL: [Level; 5] = [Level::Linear, Level::Network, Level::Coarse, Level::Corrected, Level::Reference];
+
+    /// Whether a network has a part in its answer.
+    pub fn is_learned(self) -> bool {
+        matches!(self, Level::Network | Level::Corrected)
+    }
 
     /// The level's name on the wire.
     pub fn name(self) -> &'static str {
         match self {
             Level::Linear => "linear",
+            Level::Network => "network",
             Level::Coarse => "coarse",
+            Level::Corrected => "corrected",
             Level::Reference => "reference",
         }
     }
@@ -263,6 +275,24 @@ pub enum PredictError {
         level: &'static str,
         /// What failed.
         cause: FrictionError,
+    },
+    /// The level's network cannot be used.
+    #[error("level `{level}`: {cause}")]
+    Weights {
+        /// The level.
+        level: &'static str,
+        /// What is wrong with its weights.
+        cause: WeightsError,
+    },
+    /// The level's network was not trained for such a request.
+    #[error("level `{level}` has no answer here ({field}): {problem}")]
+    NotLearned {
+        /// The level.
+        level: &'static str,
+        /// The field of the request.
+        field: &'static str,
+        /// Why.
+        problem: String,
     },
     /// The linear level's preparation or contact law failed.
     #[error("level `linear`: {0}")]

@@ -83,6 +83,16 @@ pub fn from_predict(error: PredictError) -> Problem {
             format!("auto, all, or some of {}", EFFECT_NAMES.join(", ")),
             detail,
         ),
+        PredictError::Weights { level, .. } => {
+            Problem::field(Kind::NotPossible, "accuracy.level", Some(json!(level)), "another level", detail)
+        }
+        PredictError::NotLearned { field, .. } => Problem::field(
+            Kind::NotPossible,
+            field,
+            None,
+            "what the level's network was trained on, or another level",
+            detail,
+        ),
         PredictError::Patch(error) => from_patch(&error, detail),
         PredictError::Mesh(WallError::Geometry(_)) => Problem::field(
             Kind::InvalidMesh,

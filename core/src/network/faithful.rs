@@ -1,0 +1,169 @@
+//! The network of the paper: two bodies as graphs, attention from the soft one to the rigid one, a decoder that gives each node's displacement.
+//!
+//! ```text
+//! S = relu(tag(relu(tag(soft))))      64 × 256, TAGConv with K = 3 over the patch's mesh
+//! R = relu(tag(relu(tag(rigid))))    102 × 256, the same over the tool's mesh
+//! Aₕ = softmax(S Wₕ (R Wₕ)ᵀ / √256)   two heads; one projection serves query and key, the values are R itself
+//! u  = decoder([S, A₁ R, A₂ R])       768 → 256 → 256 → 256 → 3 with ReLU, a residual on the positions at rest
+//! ```
+//!
+//! After M. Saleh et al., *Physics-Encoded Graph Neural Networks for Deformation Prediction under Contact* (ICRA 2024). Where the public description is
+//! silent, this program chose: the softmax's scale, no bias in the projections, displacements in units of [`UNIT_MM`], and the tool at first touch,
+//! its forward end following the tip. A prediction attends to its own tool alone, and every edge counts in both directions.
+//!
+//! Not here: the comparison with other networks, training (`retina-models`).
+
+pub mod features;
+pub mod tag;
+pub mod tool;
+
+use nalgebra::Vector3;
+
+use super::dense::{Into, fill_rows, product, product_transposed};
+use super::input::Field;
+use super::weights::{Weights, WeightsError};
+use crate::patch::NODE_COUNT;
+use features::{RIGID, SOFT};
+use tag::{HOPS, Propagation, TagConv};
+use tool::TOOL_NODES;
+
+/// Width of the encoders and of the decoder.
+pub const WIDTH: usize = 256;
+/// Heads of the attention.
+pub const HEADS: usize = 2;
+/// Layers of the decoder.
+pub const DECODER: [[usize; 2]; 4] = [[WIDTH * (1 + HEADS), WIDTH], [WIDTH, WIDTH], [WIDTH, WIDTH], [WIDTH, 3]];
+/// Unit of the learned displacements (mm).
+pub const UNIT_MM: f32 = 0.1;
+/// Name in the weights.
+pub const NAME: &str = "faithful";
+
+struct Dense {
+    weight: Vec<f32>,
+    bias: Vec<f32>,
+}
+
+/// The network with its weights.
+pub struct FaithfulNetwork {
+    soft: [TagConv; 2],
+    rigid: [TagConv; 2],
+    /// `W Wᵀ / √256` of each head: query times key in one matrix.
+    heads: [Vec<f32>; HEADS],
+    decoder: Vec<Dense>,
+    tool: Propagation,
+}
+
+/// Memory that one thread keeps between predictions.
+#[derive(Default)]
+pub struct Memory {
+    hops: Vec<f32>,
+    layer: Vec<f32>,
+    rigid: Vec<f32>,
+    query: Vec<f32>,
+    scores: Vec<f32>,
+    joined: Vec<f32>,
+    next: Vec<f32>,
+}
+
+/// `x = max(x, 0)`.
+pub fn relu(x: &mut [f32]) {
+    x.iter_mut().for_each(|x| *x = x.max(0.0));
+}
+
+/// Every row of `columns` numbers becomes positive and adds up to one.
+pub fn softmax(rows: &mut [f32], columns: usize) {
+    for row in rows.chunks_exact_mut(columns) {
+        let largest = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        row.iter_mut().for_each(|x| *x = (*x - largest).exp());
+        let total: f32 = row.iter().sum();
+        row.iter_mut().for_each(|x| *x /= total);
+    }
+}
+
+impl FaithfulNetwork {
+    /// The network with these weights.
+    ///
+    /// # Errors
+    /// [`WeightsError`].
+    pub fn new(file: &[u8]) -> Result<Self, WeightsError> {
+        let weights = Weights::read(NAME, file)?;
+        let encoder = |body: &str, inputs: usize| -> Result<[TagConv; 2], WeightsError> {
+            let layer = |at: usize, inputs: usize| TagConv::new(&weights, &format!("{body}.{at}"), inputs);
+            Ok([layer(0, inputs)?, layer(1, WIDTH)?])
+        };
+        let head = |at: usize| -> Result<Vec<f32>, WeightsError> {
+            let weight = weights.take(&format!("head.{at}"), &[WIDTH, WIDTH])?;
+            let mut folded = vec![0.0; WIDTH * WIDTH];
+            product_transposed(&mut folded, &weight, &weight, WIDTH, WIDTH);
+            folded.iter_mut().for_each(|x| *x /= (WIDTH as f32).sqrt());
+            Ok(folded)
+        };
+        let dense = |(at, [inner, outer]): (usize, [usize; 2])| -> Result<Dense, WeightsError> {
+            Ok(Dense {
+                weight: weights.take(&format!("decoder.{at}.weight"), &[inner, outer])?,
+                bias: weights.take(&format!("decoder.{at}.bias"), &[outer])?,
+            })
+        };
+        Ok(FaithfulNetwork {
+            soft: encoder("soft", SOFT)?,
+            rigid: encoder("rigid", RIGID)?,
+            heads: [head(0)?, head(1)?],
+            decoder: DECODER.into_iter().enumerate().map(dense).collect::<Result<_, _>>()?,
+            tool: Propagation::new(TOOL_NODES, &tool::edges()),
+        })
+    }
+
+    /// The encoded patch, 64 × 256; depends on the patch alone, so it can be kept.
+    pub fn encode_patch(&self, rest: &Field, mesh: &Propagation, memory: &mut Memory) -> Vec<f32> {
+        let mut features = Vec::new();
+        features::soft(rest, &mut features);
+        let mut encoded = Vec::new();
+        encode(&self.soft, mesh, &features, memory, &mut encoded);
+        encoded
+    }
+
+    /// Displacement of each node (mm), given the encoded patch and the numbers of the tool's nodes (`features::rigid`).
+    pub fn predict(&self, soft: &[f32], tool: &[f32], memory: &mut Memory) -> Field {
+        let mut rigid = std::mem::take(&mut memory.rigid);
+        encode(&self.rigid, &self.tool, tool, memory, &mut rigid);
+        let Memory { query, scores, joined, next, .. } = memory;
+        joined.resize(NODE_COUNT * DECODER[0][0], 0.0);
+        for (row, soft) in joined.chunks_exact_mut(DECODER[0][0]).zip(soft.chunks_exact(WIDTH)) {
+            row[..WIDTH].copy_from_slice(soft);
+        }
+        query.resize(NODE_COUNT * WIDTH, 0.0);
+        scores.resize(NODE_COUNT * TOOL_NODES, 0.0);
+        for (at, head) in self.heads.iter().enumerate() {
+            product(query, soft, head, WIDTH, WIDTH, Into::Place);
+            product_transposed(scores, query, &rigid, TOOL_NODES, WIDTH);
+            softmax(scores, TOOL_NODES);
+            product(query, scores, &rigid, TOOL_NODES, WIDTH, Into::Place);
+            for (row, value) in joined.chunks_exact_mut(DECODER[0][0]).zip(query.chunks_exact(WIDTH)) {
+                row[WIDTH * (1 + at)..][..WIDTH].copy_from_slice(value);
+            }
+        }
+        memory.rigid = rigid;
+        for (at, (dense, [inner, outer])) in self.decoder.iter().zip(DECODER).enumerate() {
+            next.resize(NODE_COUNT * outer, 0.0);
+            fill_rows(next, &dense.bias);
+            product(next, joined, &dense.weight, inner, outer, Into::Sum);
+            if at + 1 < DECODER.len() {
+                relu(next);
+            }
+            std::mem::swap(joined, next);
+        }
+        let rows = joined.as_chunks::<3>().0;
+        std::array::from_fn(|node| Vector3::from(rows[node]) * UNIT_MM)
+    }
+}
+
+/// Two layers of TAGConv, each followed by ReLU.
+fn encode(layers: &[TagConv; 2], mesh: &Propagation, features: &[f32], memory: &mut Memory, out: &mut Vec<f32>) {
+    let Memory { hops, layer, .. } = memory;
+    layers[0].forward(mesh, features, hops, layer);
+    relu(layer);
+    layers[1].forward(mesh, layer, hops, out);
+    relu(out);
+}
+
+const _: () = assert!(HOPS == 3, "K of the paper");

@@ -1,0 +1,9 @@
+//! What the networks and the baselines err by, on every split: the tables of `REPORT.md`.
+//!
+//! Read `errors` (how an error is measured) → `predictors` (who answers) → `baselines/*` → `tables` → `report`.
+
+pub mod baselines;
+pub mod errors;
+pub mod predictors;
+pub mod report;
+pub mod tables;
