@@ -4,6 +4,7 @@
 //! steps if it must. Not here: how fine a mesh a level uses, where the mesh is centred.
 
 pub mod friction;
+mod light;
 pub mod settled;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
@@ -118,6 +119,8 @@ pub struct Wall<'a> {
     solid: Solid,
     contact: ContactSettings,
     tool: Tool<'a>,
+    /// Radius of the rim (mm).
+    rim_mm: f64,
     /// Positions without the needle's contact, where they are not those at rest.
     settled: Option<Vec<f64>>,
     /// Force of the pressure on the whole surface (mN).
@@ -160,14 +163,24 @@ pub struct ContactSummary {
     pub center: [f64; 2],
 }
 
+/// How far the tissue of an equilibrium is from its rest state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Strains {
+    /// Largest |principal stretch − 1|.
+    pub max_strain: f64,
+    /// Smallest present volume over that at rest; zero or less where the tissue is turned inside out.
+    pub least_volume_ratio: f64,
+}
+
 /// Residual relative to the force scale at which Newton stops.
 const RELATIVE_TOLERANCE: f64 = 1e-7;
 /// The same in the first solve of a softened contact.
 const SOFTENED_TOLERANCE: f64 = 1e-3;
 /// Force scale under pose control (mN): that of a light touch.
 const POSE_FORCE_SCALE_MN: f64 = 0.01;
-/// Smallest force scale (mN): below it rounding of the tissue's stresses decides.
-const SMALLEST_FORCE_MN: f64 = 1e-7;
+/// Rounding of the tissue's forces over stiffness (λ + 2µ) times squared width of the mesh: stretches are known to a few times 1e-16, and a stress
+/// acts on a piece of the mesh. No residual is asked to be smaller.
+const ROUNDING: f64 = 1e-15;
 /// The same in a wall under pressure, over the force of the pressure on the whole surface.
 const SMALLEST_FORCE_SHARE: f64 = 1e-5;
 /// What is tried, in this order: directly from the given start, then from first touch in load steps.
@@ -221,7 +234,19 @@ impl<'a> Wall<'a> {
         };
         let materials = topology.element_layer.iter().map(|&layer| lame(layer)).collect();
         let faces = ContactFaces::new(&topology.faces, &geometry.rest, contact.points_per_edge);
-        Ok(Wall { topology, geometry, materials, faces, solid, contact, tool, settled: None, pressure_force_mn: 0.0 })
+        let rim_mm = mesh.disc.radii.last().copied().unwrap_or_default();
+        Ok(Wall {
+            topology,
+            geometry,
+            materials,
+            faces,
+            solid,
+            contact,
+            tool,
+            rim_mm,
+            settled: None,
+            pressure_force_mn: 0.0,
+        })
     }
 
     /// The mesh's topology.
@@ -277,6 +302,12 @@ impl<'a> Wall<'a> {
     pub fn place_tip(&self, positions: &mut [f64], offset: &Vector3<f64>) {
         let tip = self.tool.patch_from_needle.translation.vector + offset;
         positions[3 * self.topology.needle()..].copy_from_slice(tip.as_slice());
+    }
+
+    /// What rounding leaves of the balance of forces (mN).
+    fn rounding_mn(&self) -> f64 {
+        let stiffest_kpa = self.materials.iter().map(|lame| lame.lambda + 2.0 * lame.mu).fold(0.0, f64::max);
+        ROUNDING * stiffest_kpa * self.rim_mm * self.rim_mm
     }
 
     fn contact(&self) -> Contact<'_> {
@@ -442,12 +473,14 @@ impl<'a> Wall<'a> {
             driven: Some(self.topology.needle()),
             dead_load: &[],
         };
-        let smallest = SMALLEST_FORCE_MN.max(SMALLEST_FORCE_SHARE * self.pressure_force_mn);
-        let scale = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN).max(smallest);
+        let smallest = (self.rounding_mn() / RELATIVE_TOLERANCE).max(SMALLEST_FORCE_SHARE * self.pressure_force_mn);
+        let force_mn = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN);
+        let scale = force_mn.max(smallest);
+        let light_mn = self.light_residual_mn(&terms[0], force_mn);
         let settings = NewtonSettings {
             globalization: attempt.globalization,
             force_scale_mn: scale,
-            tolerance_mn: tolerance * scale,
+            tolerance_mn: (tolerance * scale).max(light_mn),
             max_iterations: attempt.max_iterations.min(MOST_ITERATIONS.saturating_sub(*spent)),
             held_iterations: HELD_ITERATIONS,
             max_travel_mm: MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
@@ -504,23 +537,24 @@ impl<'a> Wall<'a> {
         summary
     }
 
-    /// Largest |principal stretch − 1| at the quadrature points.
-    pub fn max_strain(&self, positions: &[f64]) -> f64 {
+    /// Stretch and volume at the quadrature points.
+    pub fn strains(&self, positions: &[f64]) -> Strains {
         let stencils = &self.topology.elements;
         let mut local = [0.0; 3 * NODES];
-        let mut largest: f64 = 0.0;
+        let mut found = Strains { max_strain: 0.0, least_volume_ratio: f64::INFINITY };
         for element in 0..stencils.len() {
             stencils.gather(element, positions, &mut local);
             for point in 0..POINTS {
                 let f = self.geometry.solid.deformation_gradient(element, point, &local);
+                found.least_volume_ratio = found.least_volume_ratio.min(f.determinant());
                 // |σ − 1| ≤ ‖F − 1‖ for every principal stretch σ: only candidates are worth an eigenvalue problem.
-                if (f - Matrix3::identity()).norm() > largest {
+                if (f - Matrix3::identity()).norm() > found.max_strain {
                     let stretches =
                         (f.transpose() * f).symmetric_eigenvalues().map(|l| (l.max(0.0).sqrt() - 1.0).abs());
-                    largest = largest.max(stretches.max());
+                    found.max_strain = found.max_strain.max(stretches.max());
                 }
             }
         }
-        largest
+        found
     }
 }

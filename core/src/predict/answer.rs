@@ -13,13 +13,14 @@ use super::linear::LinearAnswer;
 use super::question::{Begun, Question, Sink};
 use super::topologies::shared_topology;
 use super::types::{ContactReport, ContactState, Level, NeedleOutcome, PredictError, Prediction, SolverReport};
-use super::{PENETRATION_WARNING_MM, Workspace};
+use super::{PENETRATION_WARNING_MM, RIM_WARNING_MM, Workspace};
 use crate::effects::{adhesion, contact, friction};
 use crate::equilibrium::Solid;
 use crate::equilibrium::settled::Settled;
 use crate::patch::vertex_normals;
 use crate::progress::Progress;
 use crate::solve::newton;
+use crate::surface::Surface;
 
 impl Question<'_> {
     pub(super) fn answer(
@@ -32,7 +33,9 @@ impl Question<'_> {
         let sliding = Sliding { coefficient: self.prepared.scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
         let pull = Pull {
             normal_force_mn: 0.0,
+            tangential_share: 0.0,
             depth_mm: self.prepared.scene.tissue.retina_thickness_mm(),
+            suction_kpa: sink.change_kpa.map_or(0.0, |change_kpa| (-change_kpa).max(0.0)),
             strength_kpa: self.prepared.scene.tissue.bond.strength_kpa,
         };
         let linear = match self.begin(&self.raised(&sink))? {
@@ -49,6 +52,7 @@ impl Question<'_> {
         let [x, y] = linear.press.touch.parameter;
         let pull = Pull {
             normal_force_mn: linear.normal_force_mn,
+            tangential_share: sliding.coefficient.min(sliding.tangent),
             depth_mm: pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
             ..pull
         };
@@ -94,6 +98,7 @@ impl Question<'_> {
                 max_pressure_kpa: linear.max_pressure_kpa,
                 max_penetration_mm: 0.0,
                 max_strain: strain,
+                least_volume_ratio: None,
                 slipping_share: None,
                 bond_damage: None,
             },
@@ -200,6 +205,7 @@ impl Question<'_> {
                 max_pressure_kpa: 0.0,
                 max_penetration_mm: 0.0,
                 max_strain: settled.as_ref().map_or(0.0, Settled::max_strain),
+                least_volume_ratio: None,
                 slipping_share: None,
                 bond_damage: None,
             },
@@ -238,6 +244,22 @@ impl Question<'_> {
                 "the needle stands {:.1} µm inside the predicted surface: its edge is sharper than this level resolves",
                 penetration_mm * 1e3
             ));
+        }
+        let [x, y] = answer.estimate.center;
+        if let Surface::Mesh(field) = &patch.surface
+            && answer.contact.state != ContactState::Clear
+            && field.rim_distance_mm(x, y) < RIM_WARNING_MM
+        {
+            warnings.push(format!(
+                "the mesh ends, or has a hole, {:.2} mm from the contact: the surface is taken to go on level there",
+                field.rim_distance_mm(x, y)
+            ));
+        }
+        if answer.contact.least_volume_ratio.is_some_and(|ratio| ratio <= 0.0) {
+            warnings.push(
+                "small-strain elasticity turns the tissue under the needle inside out: simulate `finite_strain`"
+                    .to_owned(),
+            );
         }
         Prediction {
             vertices: deformed.iter().map(|vertex| frame * vertex).collect(),
