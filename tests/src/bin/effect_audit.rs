@@ -139,7 +139,7 @@ fn report(audited: &BTreeMap<u64, Audited>, seed: u64) -> (String, String) {
         .collect();
     let mut text = format!(
         "# `auto` against `all`\n\nWritten by `cargo run --release -p retina-tests --bin effect_audit -- {} {seed}`; not by hand. Level `coarse`, one thread, both ways in \
-         turn, a short answer the second time it is asked; the machine was busy with other work, so read the ratios of times. The tolerance is {AUTO_TOLERANCE_UM} µm.\n\n\
+         turn, a short answer the second time it is asked. Times are those on the processor, on a busy machine: read their ratios. The tolerance is {AUTO_TOLERANCE_UM} µm.\n\n\
          ![Errors and costs](effect_audit.svg)\n\n## By class of scene\n\n\
          | scenes with | compared | within the tolerance | worst node, multiples of it | `auto` ms | `all` ms | `auto` / `all` |\n|---|---|---|---|---|---|---|\n",
         audited.len()
