@@ -1,12 +1,13 @@
 //! The equilibrium of one contact on one mesh: needle, wall and force in; positions, travel and reaction out.
 //!
 //! Patch frame throughout. [`Wall`] is the meshed problem; [`Wall::solve`] finds its equilibrium from a start, directly if it can, by load
-//! steps if it must. Read on in `load` (what is asked and answered), `guide` (how the tip is held), `attempts` (ways to an equilibrium), `friction` (its repetition), `reading` (what is read
+//! steps if it must. Read on in `load` (what is asked and answered), `guide` (how the tip is held), `attempts` (ways to an equilibrium), `light` (forces too small to move the tissue), `friction` (its repetition), `reading` (what is read
 //! off), `settled` (the wall under pressure alone). Not here: how fine a mesh a level uses, where the mesh is centred.
 
 mod attempts;
 pub mod friction;
 mod guide;
+mod light;
 mod load;
 mod reading;
 pub mod settled;
@@ -20,7 +21,7 @@ use crate::effects::finite_strain::{FiniteStrain, Lame, NeoHookean};
 use crate::mesh::wall::{LayerThickness, WallError, WallGeometry, WallTopology};
 use crate::surface::Surface;
 use crate::tissue::{LayerKind, Tissue};
-pub use load::{Addition, ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Tool};
+pub use load::{Addition, ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Strains, Tool};
 use settled::Settled;
 
 /// A meshed wall under a needle.
@@ -33,6 +34,8 @@ pub struct Wall<'a> {
     solid: Solid,
     contact: ContactSettings,
     tool: Tool<'a>,
+    /// Radius of the rim (mm).
+    rim_mm: f64,
     /// Positions without the needle's contact, where they are not those at rest.
     settled: Option<Vec<f64>>,
     /// Force of the pressure on the whole surface (mN).
@@ -75,7 +78,19 @@ impl<'a> Wall<'a> {
         };
         let materials = topology.element_layer.iter().map(|&layer| lame(layer)).collect();
         let faces = ContactFaces::new(&topology.faces, &geometry.rest, contact.points_per_edge);
-        Ok(Wall { topology, geometry, materials, faces, solid, contact, tool, settled: None, pressure_force_mn: 0.0 })
+        let rim_mm = mesh.disc.radii.last().copied().unwrap_or_default();
+        Ok(Wall {
+            topology,
+            geometry,
+            materials,
+            faces,
+            solid,
+            contact,
+            tool,
+            rim_mm,
+            settled: None,
+            pressure_force_mn: 0.0,
+        })
     }
 
     /// The mesh's topology.

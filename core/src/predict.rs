@@ -32,6 +32,7 @@ use crate::needle::Body;
 use crate::network::contact::Memory;
 use crate::patch::Patch;
 use crate::progress::Progress;
+use crate::range::ParameterRange;
 use crate::scene::puncture::PRESSURE_PER_MODULUS;
 use crate::scene::{Scene, SceneSurface};
 use crate::solve::newton;
@@ -52,8 +53,26 @@ pub const PUNCTURE_PRESSURE_PER_MODULUS: f64 = PRESSURE_PER_MODULUS.max;
 /// Depth beyond which no answer is given, as a share of retina and choroid under the contact.
 pub const MAX_DEPTH_SHARE: f64 = 0.7;
 
+/// A component of the force. What a tissue bears is checked for each request: see [`PUNCTURE_PRESSURE_PER_MODULUS`].
+pub const FORCE_COMPONENT: ParameterRange = ParameterRange {
+    name: "component of the force",
+    unit: "mN",
+    default: 0.0,
+    min: -1e6,
+    max: 1e6,
+    source: "bound of this program: 1 kN, beyond which nothing is a force on a retina",
+};
+
+/// Strain by which a change of the eye's pressure may squeeze or stretch a layer by itself: a layer that is pulled to twice its thickness nears the limit point of
+/// the neo-Hookean law in confinement, beyond which it bears nothing more.
+pub const MAX_SETTLED_STRAIN: f64 = 1.0;
+
 /// Penetration of the needle into the predicted surface from which on an answer warns of it (mm).
 pub const PENETRATION_WARNING_MM: f64 = 5e-3;
+
+/// Distance between the contact and the rim of a user's mesh from which on an answer warns of it (mm): as far as a needle moves the surface by
+/// micrometres.
+pub const RIM_WARNING_MM: f64 = 0.6;
 
 /// A scene with everything that depends on it alone. Shared between threads.
 pub struct PreparedScene {
@@ -173,6 +192,11 @@ impl PreparedScene {
     /// The request in the frame of the patch where the needle touches.
     fn aimed<'a>(&'a self, request: &'a Request, body: &'a Body) -> Result<Question<'a>, PredictError> {
         request.needle.validate()?;
+        if let Control::Force(force) = request.control {
+            for (index, &component) in force.iter().enumerate() {
+                FORCE_COMPONENT.check(&format!("force_mn[{index}]"), component)?;
+            }
+        }
         Ok(Question::new(self, request, body, self.patch_for(request, body)?))
     }
 

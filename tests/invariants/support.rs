@@ -9,6 +9,7 @@ use retina_core::progress::Silent;
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::TriangleMesh;
 use retina_core::working_range::WorkingRange;
+pub use retina_tests::cap::cap;
 
 /// The levels that are fast enough for every law.
 pub const FAST: [Level; 2] = [Level::Linear, Level::Coarse];
@@ -91,20 +92,6 @@ pub fn moved(request: &Request, by: &Isometry3<f64>) -> Request {
         request.control = Control::Force(by * force);
     }
     request
-}
-
-/// Vertices and triangles of a cap of a ball of 12 mm radius, seen from inside, on an uneven grid.
-pub fn cap() -> (Vec<Point3<f64>>, Vec<[usize; 3]>) {
-    let (n, spacing) = (30, 0.23);
-    let mut random = fastrand::Rng::with_seed(3);
-    let mut place = |index: usize| spacing * (index as f64 - 0.5 * (n - 1) as f64 + 0.5 * (random.f64() - 0.5));
-    let vertices = (0..n * n).map(|i| {
-        let (x, y) = (place(i % n), place(i / n));
-        Point3::new(x, y, 12.0 - (144.0 - x * x - y * y).sqrt())
-    });
-    let square = |i: &usize| i % n + 1 < n && i / n + 1 < n;
-    let triangles = (0..n * n).filter(square).flat_map(|i| [[i, i + 1, i + n + 1], [i, i + n + 1, i + n]]);
-    (vertices.collect(), triangles.collect())
 }
 
 /// A scene on a mesh, tissue as in the built-in scenes.

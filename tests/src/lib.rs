@@ -1,6 +1,11 @@
 //! What the test tiers and the measuring programs share. Sees every package, is seen by none.
 
+pub mod audit;
+pub mod cap;
 pub mod cost;
 pub mod held_out;
+pub mod laws;
+pub mod random_scene;
+pub mod search;
 pub mod stated_errors;
 pub mod tolerance;

@@ -23,8 +23,9 @@ pub(super) struct Attempt {
 const SOFTENED_TOLERANCE: f64 = 1e-3;
 /// Force scale under pose control (mN): that of a light touch.
 const POSE_FORCE_SCALE_MN: f64 = 0.01;
-/// Smallest force scale (mN): below it rounding of the tissue's stresses decides.
-const SMALLEST_FORCE_MN: f64 = 1e-7;
+/// Rounding of the tissue's forces over stiffness (λ + 2µ) times squared width of the mesh: stretches are known to a few times 1e-16, and a stress
+/// acts on a piece of the mesh. No residual is asked to be smaller.
+const ROUNDING: f64 = 1e-15;
 /// The same in a wall under pressure, over the force of the pressure on the whole surface.
 const SMALLEST_FORCE_SHARE: f64 = 1e-5;
 /// What is tried, in this order: directly from the given start, then from first touch in load steps.
@@ -147,12 +148,14 @@ impl Wall<'_> {
             driven: Some(self.topology.needle()),
             dead_load: &[],
         };
-        let smallest = SMALLEST_FORCE_MN.max(SMALLEST_FORCE_SHARE * self.pressure_force_mn);
-        let scale = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN).max(smallest);
+        let smallest = (self.rounding_mn() / self.contact.tolerance).max(SMALLEST_FORCE_SHARE * self.pressure_force_mn);
+        let force_mn = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN);
+        let scale = force_mn.max(smallest);
+        let light_mn = self.light_residual_mn(&terms[0], force_mn);
         let settings = NewtonSettings {
             globalization: attempt.globalization,
             force_scale_mn: scale,
-            tolerance_mn: tolerance * scale,
+            tolerance_mn: (tolerance * scale).max(light_mn),
             max_iterations: attempt.max_iterations.min(MOST_ITERATIONS.saturating_sub(*spent)),
             held_iterations: HELD_ITERATIONS,
             max_travel_mm: MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
@@ -160,6 +163,12 @@ impl Wall<'_> {
         let solved = system.solve(positions, drive, &settings, workspace, progress);
         *spent += solved.as_ref().map_or_else(NewtonError::iterations, |report| report.iterations);
         solved
+    }
+
+    /// What rounding leaves of the balance of forces (mN).
+    fn rounding_mn(&self) -> f64 {
+        let stiffest_kpa = self.materials.iter().map(|lame| lame.lambda + 2.0 * lame.mu).fold(0.0, f64::max);
+        ROUNDING * stiffest_kpa * self.rim_mm * self.rim_mm
     }
 
     pub(super) fn equilibrium(

@@ -113,6 +113,15 @@ pub struct Equilibrium {
     pub load_steps: usize,
 }
 
+/// How far the tissue of an equilibrium is from its rest state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Strains {
+    /// Largest |principal stretch − 1|.
+    pub max_strain: f64,
+    /// Smallest present volume over that at rest; zero or less where the tissue is turned inside out.
+    pub least_volume_ratio: f64,
+}
+
 /// The contact of an equilibrium.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactSummary {

@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::{ContactSummary, Wall};
+use super::{ContactSummary, Strains, Wall};
 use crate::effect::{Effect, Local};
 use crate::mesh::element::{NODES, POINTS};
 
@@ -41,23 +41,24 @@ impl Wall<'_> {
         summary
     }
 
-    /// Largest |principal stretch − 1| at the quadrature points.
-    pub fn max_strain(&self, positions: &[f64]) -> f64 {
+    /// Stretch and volume at the quadrature points.
+    pub fn strains(&self, positions: &[f64]) -> Strains {
         let stencils = &self.topology.elements;
         let mut local = [0.0; 3 * NODES];
-        let mut largest: f64 = 0.0;
+        let mut found = Strains { max_strain: 0.0, least_volume_ratio: f64::INFINITY };
         for element in 0..stencils.len() {
             stencils.gather(element, positions, &mut local);
             for point in 0..POINTS {
                 let f = self.geometry.solid.deformation_gradient(element, point, &local);
+                found.least_volume_ratio = found.least_volume_ratio.min(f.determinant());
                 // |σ − 1| ≤ ‖F − 1‖ for every principal stretch σ: only candidates are worth an eigenvalue problem.
-                if (f - Matrix3::identity()).norm() > largest {
+                if (f - Matrix3::identity()).norm() > found.max_strain {
                     let stretches =
                         (f.transpose() * f).symmetric_eigenvalues().map(|l| (l.max(0.0).sqrt() - 1.0).abs());
-                    largest = largest.max(stretches.max());
+                    found.max_strain = found.max_strain.max(stretches.max());
                 }
             }
         }
-        largest
+        found
     }
 }

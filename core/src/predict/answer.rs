@@ -13,7 +13,7 @@ use super::linear::LinearAnswer;
 use super::question::{Begun, Question, Sink};
 use super::topologies::shared_topology;
 use super::types::{ContactReport, ContactState, Level, NeedleOutcome, PredictError, Prediction, SolverReport};
-use super::{PENETRATION_WARNING_MM, Workspace};
+use super::{PENETRATION_WARNING_MM, RIM_WARNING_MM, Workspace};
 use crate::effects::puncture::{Burden, Nearest};
 use crate::effects::{adhesion, contact, friction, puncture, tool_flex};
 use crate::equilibrium::settled::Settled;
@@ -21,6 +21,7 @@ use crate::equilibrium::{Solid, Tool};
 use crate::patch::vertex_normals;
 use crate::progress::Progress;
 use crate::solve::newton;
+use crate::surface::Surface;
 
 impl Question<'_> {
     pub(super) fn answer(
@@ -67,7 +68,9 @@ impl Question<'_> {
             sliding: Sliding { coefficient: scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 },
             pull: Pull {
                 normal_force_mn: 0.0,
+                tangential_share: 0.0,
                 depth_mm: scene.tissue.retina_thickness_mm(),
+                suction_kpa: sink.change_kpa.map_or(0.0, |change_kpa| (-change_kpa).max(0.0)),
                 strength_kpa: scene.tissue.bond.strength_kpa,
             },
             bending: self.bending(None),
@@ -86,6 +89,7 @@ impl Question<'_> {
             sliding: Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..still.sliding },
             pull: Pull {
                 normal_force_mn: linear.normal_force_mn,
+                tangential_share: still.sliding.coefficient.min(linear.press.tangent()),
                 depth_mm: still.pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
                 ..still.pull
             },
@@ -124,6 +128,7 @@ impl Question<'_> {
                 max_pressure_kpa: linear.max_pressure_kpa,
                 max_penetration_mm: 0.0,
                 max_strain: strain,
+                least_volume_ratio: None,
                 slipping_share: None,
                 bond_damage: None,
                 puncture_share: 0.0,
@@ -241,6 +246,7 @@ impl Question<'_> {
                 max_pressure_kpa: 0.0,
                 max_penetration_mm: 0.0,
                 max_strain: settled.as_ref().map_or(0.0, Settled::max_strain),
+                least_volume_ratio: None,
                 slipping_share: None,
                 bond_damage: None,
                 puncture_share: 0.0,
@@ -306,6 +312,22 @@ impl Question<'_> {
                 "the needle stands {:.1} µm inside the predicted surface: its edge is sharper than this level resolves",
                 penetration_mm * 1e3
             ));
+        }
+        let [x, y] = answer.estimate.center;
+        if let Surface::Mesh(field) = &patch.surface
+            && answer.contact.state != ContactState::Clear
+            && field.rim_distance_mm(x, y) < RIM_WARNING_MM
+        {
+            warnings.push(format!(
+                "the mesh ends, or has a hole, {:.2} mm from the contact: the surface is taken to go on level there",
+                field.rim_distance_mm(x, y)
+            ));
+        }
+        if answer.contact.least_volume_ratio.is_some_and(|ratio| ratio <= 0.0) {
+            warnings.push(
+                "small-strain elasticity turns the tissue under the needle inside out: simulate `finite_strain`"
+                    .to_owned(),
+            );
         }
         let deflection_mm = answer.deflection.map(|deflection| frame * deflection);
         let rigid_tip = self.request.needle.tip_mm + direction * answer.travel_mm;

@@ -134,6 +134,14 @@ pub fn decide(
     ];
     let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };
     let is_on = |name: &str| reports.iter().any(|report| report.name == name && report.simulated);
+    if is_on(effects::adhesion::NAME) && expected.pull.tears_all_off() {
+        let Pull { suction_kpa, strength_kpa, .. } = expected.pull;
+        let problem = format!(
+            "a fall of the eye's pressure by {suction_kpa} kPa pulls at all of the retina with more than the bond's strength of {strength_kpa} kPa: it comes off everywhere, \
+             which has no equilibrium"
+        );
+        return Err(PredictError::Effect { name: effects::adhesion::NAME.to_owned(), problem });
+    }
     Ok(Decision {
         solid,
         contact,

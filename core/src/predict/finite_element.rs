@@ -9,7 +9,7 @@ use crate::effects::pressure::Pressure;
 use crate::equilibrium::friction::FrictionError;
 use crate::equilibrium::settled::Settled;
 use crate::equilibrium::{
-    Addition, ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Tool, Wall,
+    Addition, ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Strains, Tool, Wall,
 };
 use crate::mesh::disc::DiscGeometry;
 use crate::mesh::sample::locate;
@@ -128,6 +128,8 @@ pub struct ContactEstimate {
 const FIRST_ELEMENT_PER_CONTACT: f64 = 2.0;
 /// Smallest contact radius that a mesh is made for, in needle radii.
 const SMALLEST_CONTACT: f64 = 0.05;
+/// Depth of the linear answer, in smoothing distances of the contact, below which the needle hardly moves the tissue.
+const LIGHT_PER_SMOOTHING: f64 = 0.1;
 /// Share of the normal force on slipping tissue above which a contact counts as slipping.
 const SLIPPING_FROM: f64 = 0.5;
 /// The answer of a finite-element level, patch frame.
@@ -305,10 +307,16 @@ impl Problem<'_> {
         let motion = match self.motion.force_mn {
             Some(force_mn) => {
                 let beyond = (estimate.travel_mm - estimate.touch_mm).max(0.0);
-                let area = std::f64::consts::PI
-                    * estimate.radius_mm.max(SMALLEST_CONTACT * self.tool.body.radius_mm()).powi(2);
-                let overlap = force_mn / area / self.contact(resolution).softened().stiffness_kpa_per_mm;
-                Motion { travel_mm: touch_mm + beyond + overlap, ..self.motion }
+                let contact = self.contact(resolution).softened();
+                let travel_mm = if beyond < LIGHT_PER_SMOOTHING * contact.smoothing_mm && contact == resolution.contact
+                {
+                    wall.resting_travel_mm(&wall.start(), &self.motion, touch_mm, force_mn)
+                } else {
+                    let area = std::f64::consts::PI
+                        * estimate.radius_mm.max(SMALLEST_CONTACT * self.tool.body.radius_mm()).powi(2);
+                    touch_mm + beyond + force_mn / area / contact.stiffness_kpa_per_mm
+                };
+                Motion { travel_mm, ..self.motion }
             }
             None => self.motion,
         };
@@ -343,7 +351,7 @@ impl Problem<'_> {
             travel_mm: equilibrium.travel_mm,
             deflection: equilibrium.deflection,
             reaction_mn: equilibrium.reaction_mn,
-            contact: report(&summary, wall.max_strain(&equilibrium.positions)),
+            contact: report(&summary, &wall.strains(&equilibrium.positions)),
             solver: SolverReport {
                 iterations: equilibrium.newton.iterations,
                 load_steps: equilibrium.load_steps,
@@ -373,13 +381,14 @@ fn damage(adhesion: &Adhesion, topology: &WallTopology, positions: &[f64]) -> f6
     adhesion.bond.damage(largest)
 }
 
-fn report(summary: &ContactSummary, max_strain: f64) -> ContactReport {
+fn report(summary: &ContactSummary, strains: &Strains) -> ContactReport {
     ContactReport {
         state: if summary.area_mm2 > 0.0 { ContactState::Touching } else { ContactState::Clear },
         area_mm2: summary.area_mm2,
         max_pressure_kpa: summary.max_pressure_kpa,
         max_penetration_mm: summary.max_penetration_mm.max(0.0),
-        max_strain,
+        max_strain: strains.max_strain,
+        least_volume_ratio: Some(strains.least_volume_ratio),
         slipping_share: None,
         bond_damage: None,
         puncture_share: 0.0,

@@ -245,6 +245,8 @@ fn decided(question: &Question, linear: &LinearAnswer) -> Result<Decision, Predi
         },
         pull: Pull {
             normal_force_mn: linear.normal_force_mn,
+            tangential_share: 0.0,
+            suction_kpa: 0.0,
             depth_mm: tissue.retina_thickness_mm(),
             strength_kpa: tissue.bond.strength_kpa,
         },

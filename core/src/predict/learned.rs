@@ -233,6 +233,7 @@ impl Question<'_> {
             max_pressure_kpa: linear.max_pressure_kpa,
             max_penetration_mm: 0.0,
             max_strain: strain,
+            least_volume_ratio: None,
             slipping_share: None,
             bond_damage: None,
             puncture_share: 0.0,

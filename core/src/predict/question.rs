@@ -6,7 +6,7 @@ use super::choice::{Decision, Expected, decide, pressure, tool_flex};
 use super::expected_error::Situation;
 use super::linear::{LinearAnswer, Load, Press, press};
 use super::types::{Control, EffectChoice, EffectReport, Level, PredictError, Request};
-use super::{MAX_DEPTH_SHARE, PUNCTURE_PRESSURE_PER_MODULUS, PreparedScene};
+use super::{MAX_DEPTH_SHARE, MAX_SETTLED_STRAIN, PUNCTURE_PRESSURE_PER_MODULUS, PreparedScene};
 use crate::effects::finite_strain;
 use crate::effects::puncture::Limits;
 use crate::equilibrium::settled::Settled;
@@ -72,7 +72,7 @@ pub(crate) struct Sink {
     pub(crate) report: EffectReport,
     /// Change of the pressure (kPa), where it is simulated.
     pub(super) change_kpa: Option<f64>,
-    /// Sinking that linear elasticity expects of it at the patch's centre, in magnitude (mm); 0 where it is not simulated.
+    /// Largest sinking of a node that is expected of it, in magnitude (mm); 0 where it is not simulated.
     pub(super) expected_mm: f64,
 }
 
@@ -123,9 +123,16 @@ impl Question<'_> {
     pub(crate) fn sink(&self) -> Sink {
         let Scene { tissue, .. } = &self.prepared.scene;
         let change_kpa = self.prepared.scene.pressure_change_kpa();
-        let linear = Settled::new(tissue, change_kpa, Solid::Elasticity, |_| true);
-        let centre = self.patch().surface.column(0.0, 0.0);
-        let sink_mm = linear.sink_mm(&centre, 0.0);
+        let laws =
+            [Solid::Elasticity, Solid::FiniteStrain].map(|solid| Settled::new(tissue, change_kpa, solid, |_| true));
+        let surface = &self.patch().surface;
+        // The floor of a pit sinks less than what is around it, and soft tissue that is pulled yields more than linearly.
+        let deepest = |settled: &Settled| {
+            let sinks = self.patch().parameters.iter().map(|&[x, y]| settled.sink_mm(&surface.column(x, y), 0.0));
+            sinks.fold(0.0, |deepest: f64, sink| if sink.abs() > deepest.abs() { sink } else { deepest })
+        };
+        let [linear, finite] = laws.each_ref().map(deepest);
+        let sink_mm = if finite.abs() > linear.abs() { finite } else { linear };
         let report = pressure::report(&self.request.effects, change_kpa, sink_mm * 1e3);
         let simulated = report.simulated;
         let expected_mm = if simulated { sink_mm.abs() } else { 0.0 };
@@ -133,6 +140,15 @@ impl Question<'_> {
     }
 
     pub(super) fn decide(&self, expected: Expected, sink: &Sink) -> Result<Decision, PredictError> {
+        if let (Some(change_kpa), Some(settled)) = (sink.change_kpa, self.settled(sink.change_kpa, Solid::FiniteStrain))
+            && settled.max_strain() > MAX_SETTLED_STRAIN
+        {
+            let problem = format!(
+                "a change by {change_kpa} kPa alone strains a layer of this tissue by {:.2}, beyond the limit of {MAX_SETTLED_STRAIN}",
+                settled.max_strain()
+            );
+            return Err(PredictError::Effect { name: crate::effects::pressure::NAME.to_owned(), problem });
+        }
         decide(&self.request.effects, self.request.level, expected, &sink.report)
     }
 

@@ -121,6 +121,8 @@ pub struct ContactReport {
     pub max_penetration_mm: f64,
     /// Largest principal stretch minus one, in magnitude, anywhere in the tissue (an estimate at level `linear`).
     pub max_strain: f64,
+    /// Smallest present volume over that at rest, anywhere in the tissue; `None` at level `linear`, which knows no elements.
+    pub least_volume_ratio: Option<f64>,
     /// Share of the normal force that acts where the tissue slides along the needle, 0 to 1; where friction is simulated.
     pub slipping_share: Option<f64>,
     /// Largest share of the strength that the retina's bond has lost anywhere, 0 intact to 1 parted; where adhesion is simulated.

@@ -14,6 +14,7 @@ use crate::predict::finite_element::ContactEstimate;
 use crate::predict::linear::LinearAnswer;
 use crate::predict::{Control, CutOrGrid, EffectReport, PredictError, PreparedScene, Question, Request};
 use crate::progress::Progress;
+use crate::range::ParameterRange;
 use crate::solve::newton::NewtonError;
 
 /// What linear elasticity expects of a sequence.
@@ -115,11 +116,15 @@ impl Sequence {
         let mut before_s = 0.0;
         for (index, step) in self.steps.iter().enumerate() {
             let step_s = step.time_s - before_s;
-            TIME_STEP.check("", step_s).map_err(|error| SequenceError::Time {
+            // Times a bound apart differ by a little less or more once they are written with a finite number of digits.
+            let rounding_s = f64::EPSILON * step.time_s.abs();
+            let widened =
+                ParameterRange { min: TIME_STEP.min - rounding_s, max: TIME_STEP.max + rounding_s, ..TIME_STEP };
+            widened.check("", step_s).map_err(|_| SequenceError::Time {
                 step: index,
                 step_s,
-                min_s: error.min,
-                max_s: error.max,
+                min_s: TIME_STEP.min,
+                max_s: TIME_STEP.max,
             })?;
             before_s = step.time_s;
         }
@@ -156,8 +161,13 @@ pub(super) fn plan<'a>(
     let patch = prepared.patch_for(&sequence.request(first, &sequence.needle), body).map_err(|cause| at(0, cause))?;
     let sliding = Sliding { coefficient: prepared.scene().friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
     let tissue = &prepared.scene().tissue;
-    let pull =
-        Pull { normal_force_mn: 0.0, depth_mm: tissue.retina_thickness_mm(), strength_kpa: tissue.bond.strength_kpa };
+    let pull = Pull {
+        normal_force_mn: 0.0,
+        tangential_share: 0.0,
+        depth_mm: tissue.retina_thickness_mm(),
+        suction_kpa: 0.0,
+        strength_kpa: tissue.bond.strength_kpa,
+    };
     let request = sequence.request(first, &sequence.needle);
     let question = Question::new(prepared, &request, body, CutOrGrid::Grid(patch.patch()));
     let (limits, pressure) = (question.puncture_limits(), question.sink().report);

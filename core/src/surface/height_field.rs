@@ -77,7 +77,18 @@ impl HeightField {
         inside.then(|| a.z + weight_b * (b.z - a.z) + weight_c * (c.z - a.z))
     }
 
+    /// How far (x, y) is from the rim, in the plane (mm); 0 where no triangle is over it.
+    pub fn rim_distance_mm(&self, x: f64, y: f64) -> f64 {
+        let covered = self.grid.cell(x, y).iter().any(|&triangle| self.height_in(triangle, x, y).is_some());
+        if covered { self.nearest_rim(x, y).0.sqrt() } else { 0.0 }
+    }
+
     fn height_of_nearest_rim(&self, x: f64, y: f64) -> f64 {
+        self.nearest_rim(x, y).1
+    }
+
+    /// Squared distance of the nearest point of the rim, in the plane (mm²), and its height (mm).
+    fn nearest_rim(&self, x: f64, y: f64) -> (f64, f64) {
         let p = Point2::new(x, y);
         let mut nearest = (f64::INFINITY, 0.0);
         for &[from, to] in &self.rim {
@@ -89,7 +100,7 @@ impl HeightField {
                 nearest = (distance_squared, a.z + t * (b.z - a.z));
             }
         }
-        nearest.1
+        nearest
     }
 }
 

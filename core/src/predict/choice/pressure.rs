@@ -5,7 +5,8 @@ use super::AUTO_TOLERANCE_UM;
 use super::criterion::Criterion;
 use crate::effects::pressure;
 
-/// The decision about pressure, from the change of pressure (kPa) and the sinking that linear elasticity expects of it (µm).
+/// The decision about pressure, from the change of pressure (kPa) and the sinking of the patch's node that sinks most (µm): by linear or by
+/// neo-Hookean elasticity, whichever is more.
 pub fn report(choice: &EffectChoice, change_kpa: f64, sink_um: f64) -> EffectReport {
     let ruled_out = (change_kpa == 0.0).then_some("the eye's pressure is that at which the surface was measured");
     Criterion {
