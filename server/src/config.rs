@@ -60,6 +60,12 @@ pub struct Config {
     /// Milliseconds after which a simulation is stopped.
     #[arg(long, env = "RETINA_SIMULATION_TIME_LIMIT_MS", default_value_t = 300_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub simulation_time_limit_ms: u32,
+    /// Streams that may be open at once.
+    #[arg(long, env = "RETINA_STREAMS", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
+    pub streams: u16,
+    /// Milliseconds after which a stream whose client is silent, pings unanswered, is closed.
+    #[arg(long, env = "RETINA_STREAM_IDLE_MS", default_value_t = 60_000, value_parser = clap::value_parser!(u32).range(30..))]
+    pub stream_idle_ms: u32,
     /// Form of the log on standard error. RUST_LOG says what is logged; `retina_server=debug` has a line for each request.
     #[arg(long, env = "RETINA_LOG", default_value = "pretty")]
     pub log: LogForm,
@@ -191,6 +197,11 @@ impl Config {
     /// How long the work on a request may take.
     pub fn time_limit(&self) -> Duration {
         Duration::from_millis(self.time_limit_ms.into())
+    }
+
+    /// How long a stream's client may be silent.
+    pub fn stream_idle(&self) -> Duration {
+        Duration::from_millis(self.stream_idle_ms.into())
     }
 
     /// How long a simulation may take.

@@ -3,6 +3,8 @@
 use axum::Json;
 use axum::body::Body;
 use axum::extract::rejection::PathRejection;
+use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, Method, Uri, header};
 use axum::response::{IntoResponse, Response};
@@ -59,6 +61,29 @@ pub async fn predict(State(app): State<AppState>, headers: HeaderMap, body: Body
 pub async fn simulate(State(app): State<AppState>, headers: HeaderMap, body: Body) -> Result<Response, Problem> {
     let lines = app.simulate(&headers, body).await?;
     Ok(([(header::CONTENT_TYPE, "application/x-ndjson")], lines).into_response())
+}
+
+/// Poses in, surfaces out, over one WebSocket.
+///
+/// Text messages are `StreamCommand` from the client and `StreamMessage` from the server. The first opens a session, whose answers are text or
+/// binary. Of poses that come faster than they are answered the newest wins; the answer counts the others. What is wrong with a message is
+/// said by a problem and the stream goes on.
+#[utoipa::path(
+    get,
+    path = "/v1/stream",
+    tag = "stream",
+    responses(
+        (status = 101, description = "The connection speaks WebSocket from here on"),
+        (status = 426, description = "Not a WebSocket handshake", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 503, description = "Too many streams are open", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+    )
+)]
+pub async fn stream(
+    State(app): State<AppState>,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> Result<Response, Problem> {
+    let upgrade = upgrade.map_err(|rejection| Problem::new(Kind::UpgradeRequired, rejection.body_text()))?;
+    app.stream(upgrade)
 }
 
 /// The built-in scenes, and every parameter of a scene with its default, range and source.

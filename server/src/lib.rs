@@ -1,7 +1,7 @@
 //! The service: needle pose and force in, deformed retina surface and normals out, over HTTP or from a file.
 //!
 //! Read in this order: `routes` (every URL), `handlers`, [`wire`] (every message), `understand` (from the wire to the core),
-//! `answer` (one request from bytes to bytes), `simulate` (one sequence, line by line), `pool` and `scenes` (where it runs and what
+//! `answer` (one request from bytes to bytes), `simulate` (one sequence, line by line), [`stream`] (poses over a WebSocket), `pool` and `scenes` (where it runs and what
 //! is kept), [`page`] (what a browser sees). [`config`] is what the program can be told, [`problem`] how it says no. [`recording`] is a
 //! guest that looks on, `review` compares levels for the eye.
 //!
@@ -26,6 +26,7 @@ pub mod scenes;
 mod simulate;
 mod state;
 mod stopwatch;
+pub mod stream;
 mod times;
 mod understand;
 pub mod wire;

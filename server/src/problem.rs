@@ -4,8 +4,10 @@
 //! caller's fault is not logged as an error; the server's own is logged once, where it is found, and its cause stays in the log.
 
 mod kind;
+mod pool;
 mod predict;
 mod sequence;
+mod stream;
 
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
@@ -16,6 +18,7 @@ use utoipa::ToSchema;
 pub use kind::Kind;
 pub use predict::{from_out_of_range, from_predict};
 pub use sequence::from_sequence;
+pub use stream::of_pose;
 
 /// Media type of a problem document.
 pub const MEDIA_TYPE: &str = "application/problem+json";
@@ -94,6 +97,17 @@ impl Problem {
     pub fn internal(cause: impl std::fmt::Display) -> Self {
         tracing::error!(%cause, "request failed");
         Self::new(Kind::Internal, "The server failed to answer; its log says why.")
+    }
+
+    /// The same problem of an object that stands at `parent`: the fields at fault are told from there.
+    pub fn within(mut self, parent: &str) -> Self {
+        for error in &mut self.errors {
+            error.field = match error.field.as_str() {
+                "" => parent.to_owned(),
+                field => format!("{parent}.{field}"),
+            };
+        }
+        self
     }
 
     /// The document that crosses the wire.

@@ -17,16 +17,20 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::handlers;
 use crate::page;
 use crate::state::AppState;
+use crate::wire::stream::{StreamCommand, StreamMessage};
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
 #[derive(OpenApi)]
-#[openapi(info(
-    title = "Retina",
-    description = "A needle at this pose pushes the retina with this force: what does the surface look like now?\n\n\
+#[openapi(
+    info(
+        title = "Retina",
+        description = "A needle at this pose pushes the retina with this force: what does the surface look like now?\n\n\
                    Units everywhere: mm, mN, kPa; errors in µm, times in µs. Patch frame: origin on the inner retinal surface, +z into the \
                    vitreous, so a needle pushes towards -z. Quaternions are x, y, z, w; a needle points along its own -z."
-))]
+    ),
+    components(schemas(StreamCommand, StreamMessage))
+)]
 struct Description;
 
 /// The service: state in, router out.
@@ -34,6 +38,7 @@ pub fn app(state: AppState) -> Router {
     let (routes, api) = OpenApiRouter::with_openapi(Description::openapi())
         .routes(routes!(handlers::predict))
         .routes(routes!(handlers::simulate))
+        .routes(routes!(handlers::stream))
         .routes(routes!(handlers::scenes))
         .routes(routes!(handlers::levels))
         .routes(routes!(handlers::gauges))

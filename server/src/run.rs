@@ -2,7 +2,9 @@
 //!
 //! Contract: after the stop no connection is accepted and what was accepted is answered, within a bound on the time.
 
+use std::future::pending;
 use std::io;
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::serve::ListenerExt as _;
@@ -27,7 +29,22 @@ pub async fn run(listener: TcpListener, state: AppState, shutdown: CancellationT
             tracing::debug!(%error, "a connection without TCP_NODELAY");
         }
     });
-    let serve = axum::serve(listener, app(state)).with_graceful_shutdown(shutdown.clone().cancelled_owned());
+    let serve =
+        axum::serve(listener, app(Arc::clone(&state))).with_graceful_shutdown(shutdown.clone().cancelled_owned());
+    let serve = async {
+        // The streams hear of the end when it begins, and are waited for when all else is answered.
+        let told = async {
+            shutdown.cancelled().await;
+            state.end_streams().await;
+            pending().await
+        };
+        let result = tokio::select! {
+            result = serve => result,
+            result = told => result,
+        };
+        state.end_streams().await;
+        result
+    };
     let overdue = async {
         shutdown.cancelled().await;
         sleep(GRACE).await;

@@ -5,7 +5,9 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use axum::body::Body;
+use axum::extract::ws::WebSocketUpgrade;
 use axum::http::HeaderMap;
+use axum::response::Response;
 use nalgebra::{Point3, Vector3};
 use retina_core::needle::shape::RADIUS;
 use retina_core::needle::{Needle, NeedleShape};
@@ -13,16 +15,19 @@ use retina_core::predict::budget::Budget;
 use retina_core::predict::{Control, EffectChoice, Level, Request, Workspace};
 use retina_core::scene::Scene;
 use tokio::sync::{Semaphore, mpsc};
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
 
 use crate::answer::{Question, answer, predict};
 use crate::body::{self, LARGE_AT_ONCE};
 use crate::config::Config;
-use crate::pool::{Pool, PoolError};
+use crate::pool::Pool;
 use crate::problem::{Kind, Problem};
 use crate::recording::Recorder;
 use crate::scenes::Scenes;
 use crate::simulate::{FIRST_AND_LAST, Limits, Lines, simulate};
 use crate::stopwatch::Stopwatch;
+use crate::stream::{self, LONGEST_MESSAGE};
 use crate::times::Times;
 use crate::wire::request::SceneChoice;
 use crate::write::Layout;
@@ -47,6 +52,15 @@ pub struct App {
     recorder: Option<Recorder>,
     simulations: Arc<Semaphore>,
     simulation_limits: Limits,
+    streams: Streams,
+}
+
+/// What the streams share.
+struct Streams {
+    places: Arc<Semaphore>,
+    idle: Duration,
+    open: TaskTracker,
+    stopping: CancellationToken,
 }
 
 impl App {
@@ -89,6 +103,12 @@ impl App {
             // One thread stays for predictions, where there are several.
             simulations: Arc::new(Semaphore::new(config.threads().saturating_sub(1).max(1))),
             simulation_limits: Limits { steps: config.simulation_steps.into(), time: config.simulation_time_limit() },
+            streams: Streams {
+                places: Arc::new(Semaphore::new(config.streams.into())),
+                idle: config.stream_idle(),
+                open: TaskTracker::new(),
+                stopping: CancellationToken::new(),
+            },
         }))
     }
 
@@ -110,8 +130,8 @@ impl App {
             }
         };
         self.pool.run(job).await.unwrap_or_else(|error| match &self.recorder {
-            Some(recorder) => recorder.record(b"", accepted, Err(from_pool(error))),
-            None => Err(from_pool(error)),
+            Some(recorder) => recorder.record(b"", accepted, Err(error.into())),
+            None => Err(error.into()),
         })
     }
 
@@ -138,8 +158,57 @@ impl App {
             // A line that finds no room has lost its reader.
             simulate(body.as_ref(), &scenes, limits.steps, &mut stopwatch, &mut |line| sender.try_send(line).is_ok());
         };
-        self.pool.begin(job).map_err(from_pool)?;
+        self.pool.begin(job)?;
         Lines::new(lines, permit).body().await
+    }
+
+    /// The answer to a request for a stream, which then lives until its client goes or the service stops.
+    ///
+    /// # Errors
+    /// [`Kind::Busy`] for a stream too many.
+    pub fn stream(self: &Arc<Self>, upgrade: WebSocketUpgrade) -> Result<Response, Problem> {
+        let place = Arc::clone(&self.streams.places).try_acquire_owned().map_err(|_| {
+            Problem::new(Kind::Busy, "As many streams as the service serves are open; try again in a second.")
+        })?;
+        let (app, open) = (Arc::clone(self), self.streams.open.token());
+        let upgrade = upgrade.max_message_size(LONGEST_MESSAGE).max_frame_size(LONGEST_MESSAGE);
+        Ok(upgrade.on_upgrade(async move |socket| {
+            stream::serve(socket, app).await;
+            drop((place, open));
+        }))
+    }
+
+    /// Tells every stream to end, and waits until they have.
+    pub async fn end_streams(&self) {
+        self.streams.stopping.cancel();
+        self.streams.open.close();
+        self.streams.open.wait().await;
+    }
+
+    /// Cancelled when the service stops.
+    pub(crate) fn stopping(&self) -> &CancellationToken {
+        &self.streams.stopping
+    }
+
+    /// How long a stream's client may be silent.
+    pub(crate) fn stream_idle(&self) -> Duration {
+        self.streams.idle
+    }
+
+    pub(crate) fn scenes(&self) -> Arc<Scenes> {
+        Arc::clone(&self.scenes)
+    }
+
+    pub(crate) fn times(&self) -> Arc<Times> {
+        Arc::clone(&self.times)
+    }
+
+    pub(crate) fn pool(&self) -> &Pool {
+        &self.pool
+    }
+
+    pub(crate) fn time_limit(&self) -> Duration {
+        self.time_limit
     }
 
     /// Whether every built-in scene has answered at the levels that a simulator uses.
@@ -155,15 +224,6 @@ impl App {
             )),
             None => Err(Problem::new(Kind::NotReady, "The built-in scenes are being prepared.")),
         }
-    }
-}
-
-fn from_pool(error: PoolError) -> Problem {
-    match error {
-        PoolError::Full => {
-            Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
-        }
-        PoolError::Panicked => Problem::internal(error),
     }
 }
 

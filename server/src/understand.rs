@@ -7,6 +7,7 @@
 mod needle;
 mod scene;
 mod sequence;
+mod stream;
 
 use nalgebra::Vector3;
 use retina_core::effects::EFFECT_NAMES;
@@ -17,6 +18,7 @@ use serde_json::json;
 
 pub use scene::{built_in, chosen, scene};
 pub use sequence::sequence;
+pub use stream::{Opening, opening, pose};
 
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::Vector;

@@ -9,10 +9,12 @@ pub mod catalog;
 mod either;
 pub mod fixed;
 pub mod object;
+pub mod pose;
 pub mod request;
 pub mod response;
 pub mod scene;
 pub mod sequence;
+pub mod stream;
 
 pub use catalog::{GaugeList, LevelList, Readiness, SceneList};
 pub use fixed::{Quaternion, Triangle, Vector};

@@ -7,9 +7,10 @@ use serde_json::Value;
 use crate::harness::{get, post, predict, request, send};
 use crate::schema::{assert_matches, check, description};
 
-const ROUTES: [(&str, &str); 8] = [
+const ROUTES: [(&str, &str); 9] = [
     ("post", "/v1/predict"),
     ("post", "/v1/simulate"),
+    ("get", "/v1/stream"),
     ("get", "/v1/scenes"),
     ("get", "/v1/levels"),
     ("get", "/v1/gauges"),

@@ -17,3 +17,4 @@ mod refusals;
 mod schema;
 mod sequences;
 mod sockets;
+mod stream;

@@ -2,4 +2,5 @@
 
 pub mod held_out;
 pub mod stated_errors;
+pub mod stream_client;
 pub mod tolerance;

@@ -74,6 +74,8 @@ kinds! {
         "A body may have 8 MiB. Thin out the mesh, or cut it around the needle: the nodes are the 64 vertices nearest to the contact.";
     UnsupportedMediaType = "unsupported-media-type", UNSUPPORTED_MEDIA_TYPE, "The body is not announced as JSON",
         "Send the header Content-Type: application/json.";
+    UpgradeRequired = "upgrade-required", UPGRADE_REQUIRED, "The page speaks WebSocket",
+        "GET /v1/stream begins with the WebSocket handshake of RFC 6455, version 13.";
     Busy = "busy", SERVICE_UNAVAILABLE, "Too much work is waiting",
         "The queue of the numerical threads is full. Try again after the seconds in the header Retry-After.";
     TookTooLong = "took-too-long", SERVICE_UNAVAILABLE, "The answer took too long",

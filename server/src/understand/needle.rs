@@ -9,18 +9,41 @@ use super::{DEFAULT_GAUGE, rotation, unknown_name};
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::{Quaternion, Vector};
 use crate::wire::request::{BevelledTip, FlatTip, NeedleSpec, TipName, TipShape, TipSpec};
+use crate::wire::stream::ShapeSpec;
 
 /// A direction must be at least this long; shorter ones are rounding.
 const SHORTEST_DIRECTION: f64 = 1e-9;
 
 /// The needle, inside the core's ranges.
 pub(super) fn needle(spec: &NeedleSpec) -> Result<Needle, Problem> {
-    let radius_mm = radius_mm(spec)?;
+    let radius_mm = radius_mm(spec.gauge.as_deref(), spec.radius_mm)?;
     let shape = NeedleShape { radius_mm, tip: tip(spec.tip.as_ref(), radius_mm)? };
-    let tip_mm = Point3::from(spec.tip_mm.0);
-    let orientation = orientation("needle", spec.orientation_xyzw.as_ref(), spec.direction.as_ref())?
-        .unwrap_or_else(|| orientation_pointing(&-Vector3::z_axis()));
-    let needle = Needle { shape, tip_mm, orientation };
+    placed(shape, "needle", spec.tip_mm, spec.orientation_xyzw.as_ref(), spec.direction.as_ref())
+}
+
+/// A needle's shape without its place, inside the core's ranges.
+///
+/// # Errors
+/// A problem that names the field.
+pub fn shape(spec: &ShapeSpec) -> Result<NeedleShape, Problem> {
+    let radius_mm = radius_mm(spec.gauge.as_deref(), spec.radius_mm)?;
+    let shape = NeedleShape { radius_mm, tip: tip(spec.tip.as_ref(), radius_mm)? };
+    placed(shape, "needle", Vector([0.0; 3]), None, None).map(|needle| needle.shape)
+}
+
+/// The needle of that shape at the place that the object at `path` gives.
+///
+/// # Errors
+/// A problem that names the field.
+pub fn placed(
+    shape: NeedleShape,
+    path: &str,
+    tip_mm: Vector,
+    xyzw: Option<&Quaternion>,
+    direction: Option<&Vector>,
+) -> Result<Needle, Problem> {
+    let orientation = orientation(path, xyzw, direction)?.unwrap_or_else(|| orientation_pointing(&-Vector3::z_axis()));
+    let needle = Needle { shape, tip_mm: Point3::from(tip_mm.0), orientation };
     needle.validate().map_err(|error| from_out_of_range(tip_field(&error.field, &shape), &error))?;
     Ok(needle)
 }
@@ -40,8 +63,8 @@ pub(super) fn orientation(
     }
 }
 
-fn radius_mm(spec: &NeedleSpec) -> Result<f64, Problem> {
-    let name = match (&spec.gauge, spec.radius_mm) {
+fn radius_mm(gauge: Option<&str>, radius_mm: Option<f64>) -> Result<f64, Problem> {
+    let name = match (gauge, radius_mm) {
         (Some(_), Some(_)) => return Err(both("needle.radius_mm", "needle.gauge")),
         (None, Some(radius_mm)) => return Ok(radius_mm),
         (Some(name), None) => name,
