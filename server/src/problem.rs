@@ -35,6 +35,8 @@ pub struct Problem {
     pub detail: String,
     /// The fields at fault.
     pub errors: Vec<FieldError>,
+    /// Seconds after which to try again, where that is known.
+    pub retry_after_s: Option<u32>,
 }
 
 /// A field at fault.
@@ -78,7 +80,7 @@ pub struct ProblemDocument<'a> {
 impl Problem {
     /// A problem that no field is at fault for.
     pub fn new(kind: Kind, detail: impl Into<String>) -> Self {
-        Self { kind, detail: detail.into(), errors: Vec::new() }
+        Self { kind, detail: detail.into(), errors: Vec::new(), retry_after_s: None }
     }
 
     /// A problem with one field.
@@ -90,7 +92,13 @@ impl Problem {
         detail: impl Into<String>,
     ) -> Self {
         let error = FieldError { field: field.into(), value, allowed: allowed.into() };
-        Self { kind, detail: detail.into(), errors: vec![error] }
+        Self { kind, detail: detail.into(), errors: vec![error], retry_after_s: None }
+    }
+
+    /// The same problem, with the seconds after which to try again.
+    pub fn retry_after(mut self, seconds: u32) -> Self {
+        self.retry_after_s = Some(seconds);
+        self
     }
 
     /// A fault of the server: logs the cause and keeps it from the caller.
@@ -128,9 +136,13 @@ impl IntoResponse for Problem {
         let mut response = (self.kind.status(), body).into_response();
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));
-        if matches!(self.kind, Kind::Busy | Kind::NotReady) {
-            headers.insert(header::RETRY_AFTER, RETRY_AFTER_S.into());
+        if matches!(self.kind, Kind::Busy | Kind::NotReady | Kind::TooLate) {
+            headers.insert(header::RETRY_AFTER, self.retry_after_s.unwrap_or(RETRY_AFTER_S).into());
         }
+        if self.kind == Kind::Unauthorized {
+            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
+        response.extensions_mut().insert(self.kind);
         response
     }
 }

@@ -5,6 +5,7 @@
 //!
 //! Not here: what the numbers mean to the physics (`understand`), how errors are worded (`read`, `problem`).
 
+pub mod batch;
 pub mod catalog;
 mod either;
 pub mod fixed;
@@ -16,7 +17,8 @@ pub mod scene;
 pub mod sequence;
 pub mod stream;
 
-pub use catalog::{GaugeList, LevelList, Readiness, SceneList};
+pub use batch::{BatchRequest, BatchResponse};
+pub use catalog::{About, GaugeList, LevelList, Readiness, SceneList};
 pub use fixed::{Quaternion, Triangle, Vector};
 pub use request::PredictRequest;
 pub use response::PredictResponse;

@@ -4,11 +4,17 @@
 //!
 //! Not here: whether the physics is right, which the other tiers say.
 
+mod access;
 mod answers;
+mod batch;
 mod budgets;
 mod catalog;
+mod faults;
 mod harness;
 mod load;
+mod malformed;
+mod operations;
+mod overload;
 mod page;
 mod program;
 mod properties;

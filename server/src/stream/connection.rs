@@ -15,7 +15,7 @@ use futures_util::{SinkExt as _, StreamExt as _};
 use tokio::time::{interval_at, timeout};
 
 use super::binary;
-use super::session::{Open, Posed, Session, open, text};
+use super::session::{Open, Posed, Session, open, problem_text};
 use crate::problem::{Kind, Problem};
 use crate::read::read;
 use crate::state::AppState;
@@ -91,10 +91,10 @@ pub async fn serve(socket: WebSocket, app: AppState) {
 
 impl Connection {
     async fn run(mut self, mut stream: SplitStream<WebSocket>) {
-        let idle = self.app.stream_idle();
+        let idle = self.app.streams.idle;
         // A third of the time leaves a client two more occasions to show that it is there.
         let mut tick = interval_at(tokio::time::Instant::now() + idle / 3, idle / 3);
-        let stop = self.app.stopping().clone();
+        let stop = self.app.streams.stopping.clone();
         let mut stopping = false;
         let farewell = loop {
             self.go_on(stopping);
@@ -227,16 +227,14 @@ impl Connection {
     }
 
     fn refuse(&mut self, pose: Option<&StreamPose>, dropped: u32, problem: &Problem) {
+        self.app.metrics.pose_refused(problem.kind, dropped);
         let message = StreamMessage::Problem(ProblemMessage {
             sequence: pose.map(|pose| pose.sequence),
             client_time_us: pose.and_then(|pose| pose.client_time_us),
             dropped,
             problem: problem.document(),
         });
-        // Every number of a problem has a text.
-        if let Ok(message) = text(&message) {
-            self.problems.push_back(message);
-        }
+        self.problems.push_back(problem_text(&message));
     }
 }
 
@@ -264,21 +262,26 @@ fn too_long(error: &axum::Error) -> Option<(u16, &'static str)> {
 
 fn open_on(app: AppState, opening: Open) -> Work {
     Box::pin(async move {
-        let scenes = app.scenes();
+        let scenes = Arc::clone(&app.scenes);
         let job = move |_: &mut _, _: &dyn Fn() -> bool| open(opening, &scenes);
-        Done::Opened(app.pool().run(job).await.unwrap_or_else(|error| Err(error.into())))
+        let opened = app.pool.run(app.usual_ticket(None), job).await;
+        Done::Opened(opened.unwrap_or_else(|error| Err(error.into())))
     })
 }
 
 fn answer_on(app: AppState, session: Arc<Session>, posed: Posed, dropped: u32) -> Work {
     Box::pin(async move {
-        let (times, limit, asked) = (app.times(), app.time_limit(), posed.clone());
+        let (times, metrics, asked) = (Arc::clone(&app.times), Arc::clone(&app.metrics), posed.clone());
+        let (limit, ticket) = (app.time_limit, app.usual_ticket(session.level()));
         let job = move |workspace: &mut _, abandoned: &dyn Fn() -> bool| {
             let mut stopwatch = Stopwatch::start(asked.arrived, limit, abandoned);
-            session.answer(&asked, dropped, &times, workspace, &mut stopwatch)
+            session.answer(&asked, dropped, (&times, &metrics), workspace, &mut stopwatch)
         };
-        match app.pool().run(job).await.unwrap_or_else(|error| Err(error.into())) {
-            Ok(message) => Done::Answered(message),
+        match app.pool.run(ticket, job).await.unwrap_or_else(|error| Err(error.into())) {
+            Ok(message) => {
+                app.metrics.pose_answered(dropped);
+                Done::Answered(message)
+            }
             Err(problem) => Done::Refused(posed, dropped, problem),
         }
     })

@@ -4,16 +4,15 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::extract::ws::{Message, Utf8Bytes};
-use nalgebra::Point3;
-use retina_core::predict::{PreparedScene, Workspace};
+use retina_core::predict::{Level, PreparedScene, Workspace};
 use retina_core::progress::Progress as _;
-use retina_core::scene::SceneSurface;
 
 use super::binary::{self, Head};
 use crate::answer::{Question, compute};
+use crate::metrics::Metrics;
 use crate::problem::{Kind, Problem, of_pose};
 use crate::read::read;
-use crate::scenes::Scenes;
+use crate::scenes::{Scenes, shared_triangles};
 use crate::stopwatch::Stopwatch;
 use crate::times::Times;
 use crate::understand::{self, Opening};
@@ -64,17 +63,18 @@ pub fn open(open: Open, scenes: &Scenes) -> Result<(Session, Message), Problem> 
     let opening = understand::opening(&spec).map_err(within)?;
     // The scene's own problems begin with `scene`.
     let scene = scenes.get(spec.scene.as_ref()).map_err(within)?;
-    let patch = match scene.scene().surface {
-        SceneSurface::Mesh(_) => None,
-        _ => Some(scene.scene().patch(&Point3::origin()).map_err(Problem::internal)?),
-    };
-    let triangles = patch.as_ref().map_or(&[][..], |patch| &patch.triangles);
-    let opened = OpenedMessage { protocol: binary::VERSION, format: spec.format, triangles };
+    let triangles = shared_triangles(&scene)?;
+    let opened = OpenedMessage { protocol: binary::VERSION, format: spec.format, triangles: &triangles };
     let message = text(&StreamMessage::Opened(opened))?;
     Ok((Session { scene, opening, format: spec.format }, message))
 }
 
 impl Session {
+    /// The level that answers, where it is given.
+    pub fn level(&self) -> Option<Level> {
+        self.opening.shared.budget.level
+    }
+
     /// The message that answers a pose.
     ///
     /// # Errors
@@ -83,15 +83,16 @@ impl Session {
         &self,
         posed: &Posed,
         dropped: u32,
-        times: &Times,
+        (times, metrics): (&Times, &Metrics),
         workspace: &mut Workspace,
         stopwatch: &mut Stopwatch,
     ) -> Result<Message, Problem> {
         let waited = stopwatch.elapsed();
         let request = understand::pose(&self.opening, &posed.pose).map_err(of_pose)?;
         stopwatch.stage("prepare");
-        let question = Question { request, budget: self.opening.budget, times };
-        let (_, prediction) = compute(&self.scene, question, workspace, stopwatch).map_err(of_pose)?;
+        let question = Question { request, budget: self.opening.shared.budget, times };
+        let (request, prediction) = compute(&self.scene, question, workspace, stopwatch).map_err(of_pose)?;
+        metrics.predicted(request.level, stopwatch.finish());
         let micros = |time: Duration| time.as_nanos() as f64 / 1e3;
         let times = StreamTimes {
             received: micros(posed.received),
@@ -123,4 +124,9 @@ pub fn text(message: &StreamMessage) -> Result<Message, Problem> {
     let bytes = write(message, Layout::Compact).map_err(Problem::internal)?;
     let text = String::from_utf8(bytes).map_err(Problem::internal)?;
     Ok(Message::Text(text.into()))
+}
+
+/// The text message of a problem, which may repeat a `null` that the client wrote.
+pub fn problem_text(message: &StreamMessage) -> Message {
+    Message::Text(serde_json::to_string(message).unwrap_or_default().into())
 }

@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 use retina_core::effects::{inertia, viscoelasticity};
 use retina_core::needle::NeedleShape;
-use retina_core::predict::budget::{Budget, DEFAULT_LEVEL};
+use retina_core::predict::budget::DEFAULT_LEVEL;
 use retina_core::predict::{Control, EffectChoice, Request};
 use serde_json::json;
 
-use super::{budget, effects, force, needle};
+use super::{Shared, force, needle, shared};
 use crate::problem::{Kind, Problem};
 use crate::wire::stream::{OpenSpec, StreamPose};
 
@@ -16,10 +16,8 @@ use crate::wire::stream::{OpenSpec, StreamPose};
 pub struct Opening {
     /// The needle.
     pub shape: NeedleShape,
-    /// What every answer must keep.
-    pub budget: Budget,
-    /// Which effects are simulated.
-    pub effects: EffectChoice,
+    /// What all poses share.
+    pub shared: Shared,
 }
 
 /// What a session is opened with.
@@ -27,8 +25,8 @@ pub struct Opening {
 /// # Errors
 /// A problem that names the field.
 pub fn opening(spec: &OpenSpec) -> Result<Opening, Problem> {
-    let effects = effects(spec.effects.as_ref())?;
-    if let EffectChoice::Named(names) = &effects {
+    let shared = shared(spec.accuracy.as_ref(), spec.effects.as_ref())?;
+    if let EffectChoice::Named(names) = &shared.effects {
         let remembers = |name: &String| [viscoelasticity::NAME, inertia::NAME].contains(&name.as_str());
         if let Some(index) = names.iter().position(remembers) {
             let detail = format!(
@@ -42,7 +40,7 @@ pub fn opening(spec: &OpenSpec) -> Result<Opening, Problem> {
         }
     }
     let shape = needle::shape(spec.needle.as_ref().unwrap_or(&Default::default()))?;
-    Ok(Opening { shape, budget: budget(spec.accuracy.as_ref())?, effects })
+    Ok(Opening { shape, shared })
 }
 
 /// The core's request of a pose, its level that of one that asks for none.
@@ -57,6 +55,6 @@ pub fn pose(opening: &Opening, pose: &StreamPose) -> Result<Request, Problem> {
         needle,
         control: force.map_or(Control::Pose, Control::Force),
         level: DEFAULT_LEVEL,
-        effects: opening.effects.clone(),
+        effects: opening.shared.effects.clone(),
     })
 }

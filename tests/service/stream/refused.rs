@@ -103,6 +103,7 @@ fn a_session_that_cannot_be_opened_says_why() {
             (json!({"effects": ["contact", "viscoelasticity"]}), "open.effects[1]"),
             (json!({"effects": ["inertia"]}), "open.effects[0]"),
             (json!({"format": "xml"}), "open.format"),
+            (json!({"format": null}), "open.format"),
             (json!({"formats": "json"}), "open.formats"),
         ];
         for (session, field) in cases {

@@ -1,0 +1,55 @@
+//! Who is let in: what a request is expected to take and how long it can bear to wait, from a look at its body.
+//!
+//! Contract: a look costs microseconds, so it is done by the thread that talks, and bodies too long for that are not looked at; a body that is
+//! not in order is taken for a usual request, and the numerical thread that reads it says what is wrong.
+
+use std::time::Duration;
+
+use retina_core::predict::Level;
+use retina_core::predict::budget::DEFAULT_LEVEL;
+use serde::Deserialize;
+
+use crate::pool::Ticket;
+use crate::times::Times;
+use crate::understand::MAX_TIME;
+
+/// Longest body that is looked at, bytes.
+const SHORT: usize = 16 << 10;
+
+/// The part of a request that is looked at.
+#[derive(Default, Deserialize)]
+struct Glance {
+    accuracy: Option<Promise>,
+}
+
+#[derive(Default, Deserialize)]
+struct Promise {
+    level: Option<String>,
+    max_time_ms: Option<f64>,
+}
+
+/// The ticket of the prediction in `body`, where a request may wait for `longest_wait`.
+pub fn ticket(body: &[u8], times: &Times, longest_wait: Option<Duration>) -> Ticket {
+    let short = (body.len() <= SHORT).then_some(body);
+    let glance: Glance = short.and_then(|body| serde_json::from_slice(body).ok()).unwrap_or_default();
+    let promise = glance.accuracy.unwrap_or_default();
+    let named = |name: &String| Level::ALL.into_iter().find(|level| level.name() == name);
+    let level = promise.level.as_ref().and_then(named);
+    let max_time = promise
+        .max_time_ms
+        .filter(|ms| (MAX_TIME.min..=MAX_TIME.max).contains(ms))
+        .map(|ms| Duration::from_secs_f64(ms * 1e-3));
+    let usual = times.mean(level.unwrap_or(DEFAULT_LEVEL));
+    Ticket {
+        // Who asks for no level gets one that is in time.
+        cost: if level.is_none() { max_time.map_or(usual, |most| usual.min(most)) } else { usual },
+        longest_wait: shorter(max_time, longest_wait),
+    }
+}
+
+fn shorter(one: Option<Duration>, other: Option<Duration>) -> Option<Duration> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(one.min(other)),
+        (one, other) => one.or(other),
+    }
+}

@@ -1,0 +1,81 @@
+//! More than the service can do, and answers that would come too late.
+
+use std::sync::Barrier;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use retina_tests::overload::{Plan, measure, median};
+use serde_json::{Value, json};
+
+use crate::harness::{Running, agent, request, with};
+
+/// How long a request may wait in these tests, ms.
+const MAX_WAIT_MS: f64 = 100.0;
+
+#[test]
+fn at_three_times_its_capacity_the_service_does_its_work_and_refuses_the_rest_at_once() {
+    let service = Running::start(&["--threads", "1", "--max-wait-ms", &MAX_WAIT_MS.to_string()]);
+    let plan =
+        Plan { address: service.address, turn: Duration::from_secs(2), turns: 3, times_capacity: 3.0, clients: 48 };
+    let turns = measure(&plan);
+    for turn in &turns {
+        assert!(turn.other.is_empty(), "{turn:#?}");
+        assert!(turn.refused > turn.sent / 3, "{turn:#?}");
+        // What is let in has not waited for longer, whatever the machine did; a millisecond is the way to the stopwatch.
+        assert!(turn.longest_queue_ms < MAX_WAIT_MS + 1.0, "{turn:#?}");
+    }
+    let share = median(&turns, |turn| turn.goodput / turn.capacity);
+    assert!(share >= 0.9, "{share} of its capacity: {turns:#?}");
+    // The bound on the wait and the slowest work, as clients see it that wait for each answer.
+    let over = median(&turns, |turn| turn.p99_ms / (MAX_WAIT_MS + turn.calm_p99_ms));
+    assert!(over <= 1.0, "{over} of the bound: {turns:#?}");
+    let refusal = median(&turns, |turn| turn.refused_p99_ms);
+    assert!(refusal < MAX_WAIT_MS, "a refusal takes {refusal} ms: {turns:#?}");
+}
+
+#[test]
+fn an_answer_that_would_come_too_late_is_refused_at_once() {
+    let service = Running::start(&["--threads", "1"]);
+    let agent = agent();
+    let hurried = with(request("linear"), "/accuracy/max_time_ms", json!(20.0));
+    assert_eq!(service.predict(&agent, &hurried).0, 200, "nobody else is there");
+    thread::scope(|scope| {
+        let long = scope.spawn(|| service.predict(&crate::harness::agent(), &request("reference")));
+        thread::sleep(Duration::from_millis(150));
+        let started = Instant::now();
+        let (status, retry_after, body) = service.predict(&agent, &hurried);
+        let took = started.elapsed();
+        let problem: Value = serde_json::from_str(&body).expect("JSON");
+        assert_eq!((status, &problem["type"]), (503, &json!("/problems/too-late")), "{body}");
+        assert!(retry_after.is_some_and(|seconds| seconds.parse::<u32>().is_ok_and(|seconds| seconds >= 1)));
+        assert!(took < Duration::from_millis(100) && !long.is_finished(), "refused after {took:?}");
+        assert_eq!(long.join().expect("caller").0, 200);
+    });
+    assert_eq!(service.predict(&agent, &hurried).0, 200);
+}
+
+#[test]
+fn the_wait_is_bounded_for_those_who_say_nothing() {
+    let service = Running::start(&["--threads", "1", "--max-wait-ms", "60", "--queue", "64"]);
+    let callers = 24;
+    let together = Barrier::new(callers);
+    let replies: Vec<_> = thread::scope(|scope| {
+        let call = || {
+            let agent = agent();
+            together.wait();
+            service.predict(&agent, &request("coarse"))
+        };
+        let calls: Vec<_> = (0..callers).map(|_| scope.spawn(call)).collect();
+        calls.into_iter().map(|call| call.join().expect("caller")).collect()
+    });
+    let refused: Vec<_> = replies.iter().filter(|(status, ..)| *status == 503).collect();
+    assert!(!refused.is_empty() && refused.len() < callers, "{} refused", refused.len());
+    for (_, retry_after, body) in refused {
+        assert!(body.contains("/problems/too-late") && retry_after.is_some(), "{body}");
+    }
+    for (_, _, body) in replies.iter().filter(|(status, ..)| *status == 200) {
+        let answer: Value = serde_json::from_str(body).expect("JSON");
+        let queue_ms = answer["time_us"]["stages"]["queue"].as_f64().expect("number") * 1e-3;
+        assert!(queue_ms < 61.0, "waited {queue_ms} ms");
+    }
+}
