@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use retina_core::predict::Level;
-use retina_core::predict::budget::DEFAULT_LEVEL;
+use retina_core::predict::budget::{Budget, DEFAULT_LEVEL};
 use serde::Deserialize;
 
 use crate::pool::Ticket;
@@ -35,14 +35,20 @@ pub fn ticket(body: &[u8], times: &Times, longest_wait: Option<Duration>) -> Tic
     let promise = glance.accuracy.unwrap_or_default();
     let named = |name: &String| Level::ALL.into_iter().find(|level| level.name() == name);
     let level = promise.level.as_ref().and_then(named);
-    let max_time = promise
+    let budget = Budget { level, max_time_ms: promise.max_time_ms, ..Budget::default() };
+    of_budget(&budget, times, longest_wait)
+}
+
+/// The ticket of a prediction that must keep `budget`, where it may wait for `longest_wait`.
+pub fn of_budget(budget: &Budget, times: &Times, longest_wait: Option<Duration>) -> Ticket {
+    let usual = times.mean(budget.level.unwrap_or(DEFAULT_LEVEL));
+    let max_time = budget
         .max_time_ms
         .filter(|ms| (MAX_TIME.min..=MAX_TIME.max).contains(ms))
         .map(|ms| Duration::from_secs_f64(ms * 1e-3));
-    let usual = times.mean(level.unwrap_or(DEFAULT_LEVEL));
     Ticket {
         // Who asks for no level gets one that is in time.
-        cost: if level.is_none() { max_time.map_or(usual, |most| usual.min(most)) } else { usual },
+        cost: if budget.level.is_none() { max_time.map_or(usual, |most| usual.min(most)) } else { usual },
         longest_wait: shorter(max_time, longest_wait),
     }
 }

@@ -6,31 +6,38 @@
 //!
 //! Not here: what the jobs compute, and what they are expected to take (`times`).
 
+mod load;
+
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use prometheus_client::metrics::counter::Counter;
-use prometheus_client::metrics::gauge::Gauge;
 use retina_core::predict::Workspace;
 use thiserror::Error;
 use tokio::sync::oneshot;
 use tokio::time::sleep;
 use tracing::Span;
 
-/// A job says whether it did what it was expected to do, so that the time that it took tells how good the expectation was.
-type Job = Box<dyn FnOnce(&mut Workspace) -> bool + Send>;
+pub use load::Load;
+
+type Job = Box<dyn FnOnce(&mut Workspace) -> Done + Send>;
+
+/// What a job leaves to its thread.
+struct Done {
+    /// Whether it did what it was expected to do, so that the time that it took tells how good the expectation was.
+    as_expected: bool,
+    /// Tells its caller, who then finds the thread idle.
+    tell: Option<Box<dyn FnOnce()>>,
+}
+
+/// Of a job whose time tells nothing and who told its caller by itself.
+const NOTHING: Done = Done { as_expected: false, tell: None };
 
 /// Share of the longest wait up to which a job is let in: the rest is for jobs before it that take longer than expected.
 const ADMITTED_SHARE: f64 = 0.75;
-
-/// How much the last job counts in the ratio of times to expectations, and the bounds of that ratio.
-const NEWEST_SHARE: f64 = 0.05;
-const RATIO: (f64, f64) = (0.2, 10.0);
 
 /// How long a job that waits for a place in the queue waits before it asks again.
 const PATIENCE: Duration = Duration::from_millis(2);
@@ -42,20 +49,6 @@ pub struct Ticket {
     pub cost: Duration,
     /// The longest wait after which its result is still of use; `None` for any.
     pub longest_wait: Option<Duration>,
-}
-
-/// What waits and what is at work, kept by the threads.
-pub struct Load {
-    /// Jobs that wait.
-    pub waiting: Gauge,
-    /// Jobs that panicked.
-    pub panics: Counter,
-    began: Instant,
-    waiting_cost_us: AtomicI64,
-    /// What jobs took over what they were expected to take, a running mean; the bits of an f64.
-    ratio: AtomicU64,
-    /// When each thread is expected to be free, µs after the beginning; zero for one that is idle.
-    busy_until_us: Vec<AtomicU64>,
 }
 
 /// The threads, as seen from those that talk. They end when this is dropped and the queue is empty.
@@ -78,57 +71,6 @@ pub enum PoolError {
     Panicked,
 }
 
-impl Load {
-    fn new(threads: usize) -> Self {
-        Self {
-            waiting: Gauge::default(),
-            panics: Counter::default(),
-            began: Instant::now(),
-            waiting_cost_us: AtomicI64::new(0),
-            ratio: AtomicU64::new(1f64.to_bits()),
-            busy_until_us: (0..threads).map(|_| AtomicU64::new(0)).collect(),
-        }
-    }
-
-    fn now_us(&self) -> u64 {
-        // Never zero, which stands for an idle thread.
-        self.began.elapsed().as_micros() as u64 + 1
-    }
-
-    /// How long a job that comes now is expected to wait: what is waiting and what is left of the work, over the threads.
-    pub fn expected_wait(&self) -> Duration {
-        let now_us = self.now_us();
-        let mut left_us = 0;
-        for until in &self.busy_until_us {
-            match until.load(Ordering::Relaxed) {
-                0 if self.waiting.get() == 0 => return Duration::ZERO,
-                until_us => left_us += until_us.saturating_sub(now_us),
-            }
-        }
-        let waiting_us = self.waiting_cost_us.load(Ordering::Relaxed).max(0) as u64;
-        let waiting_us = (waiting_us as f64 * self.ratio()) as u64;
-        Duration::from_micros((left_us + waiting_us) / self.busy_until_us.len() as u64)
-    }
-
-    fn ratio(&self) -> f64 {
-        f64::from_bits(self.ratio.load(Ordering::Relaxed))
-    }
-
-    /// A job that was expected to take `cost` took `time`. Two threads that tell at once may lose one of both, which is as good.
-    fn took(&self, cost: Duration, time: Duration) {
-        if cost > Duration::ZERO {
-            let ratio = (time.as_secs_f64() / cost.as_secs_f64()).clamp(RATIO.0, RATIO.1);
-            let mean = self.ratio() + NEWEST_SHARE * (ratio - self.ratio());
-            self.ratio.store(mean.to_bits(), Ordering::Relaxed);
-        }
-    }
-
-    fn queued(&self, ticket: Ticket, sign: i64) {
-        self.waiting.inc_by(sign);
-        self.waiting_cost_us.fetch_add(sign * ticket.cost.as_micros() as i64, Ordering::Relaxed);
-    }
-}
-
 impl Pool {
     /// Starts `threads` threads (at least one); the first one runs `first` before it takes jobs.
     ///
@@ -145,7 +87,7 @@ impl Pool {
         let receiver = Arc::new(Mutex::new(receiver));
         let mut first: Option<Job> = Some(Box::new(|workspace: &mut Workspace| {
             first(workspace);
-            false
+            NOTHING
         }));
         for index in 0..threads {
             let (receiver, load, first) = (Arc::clone(&receiver), Arc::clone(&load), first.take());
@@ -174,16 +116,18 @@ impl Pool {
         let asked = Instant::now();
         self.queue(ticket, move |workspace| {
             if reply.is_closed() {
-                return false;
+                return NOTHING;
             }
             let waited = asked.elapsed();
             let value = match ticket.longest_wait {
                 Some(longest) if waited > longest => Err(PoolError::TooLate(waited)),
                 _ => Ok(job(workspace, &|| reply.is_closed())),
             };
-            let done = value.is_ok();
-            // The caller may have gone meanwhile; then nobody wants the value.
-            reply.send(value).is_ok() && done
+            Done {
+                as_expected: value.is_ok() && !reply.is_closed(),
+                // The caller may have gone meanwhile; then nobody wants the value.
+                tell: Some(Box::new(move || drop(reply.send(value)))),
+            }
         })?;
         result.await.map_err(|_| PoolError::Panicked)?
     }
@@ -212,14 +156,14 @@ impl Pool {
     pub fn begin(&self, ticket: Ticket, job: impl FnOnce(&mut Workspace) + Send + 'static) -> Result<(), PoolError> {
         self.queue(ticket, |workspace| {
             job(workspace);
-            false
+            NOTHING
         })
     }
 
     fn queue(
         &self,
         ticket: Ticket,
-        job: impl FnOnce(&mut Workspace) -> bool + Send + 'static,
+        job: impl FnOnce(&mut Workspace) -> Done + Send + 'static,
     ) -> Result<(), PoolError> {
         let expected = self.load.expected_wait();
         if ticket.longest_wait.is_some_and(|longest| expected > longest.mul_f64(ADMITTED_SHARE)) {
@@ -247,21 +191,23 @@ fn work(first: Option<Job>, queue: &Mutex<Receiver<(Ticket, Job)>>, load: &Load,
             let queue = queue.lock().unwrap_or_else(PoisonError::into_inner);
             let (ticket, job) = queue.recv().ok()?;
             load.queued(ticket, -1);
-            let until_us = load.now_us() + (ticket.cost.as_micros() as f64 * load.ratio()) as u64;
-            load.busy_until_us[index].store(until_us, Ordering::Relaxed);
+            load.begun(index, ticket);
             Some((ticket, job))
         });
         let Some((ticket, job)) = taken else { return };
         let began = Instant::now();
-        match catch_unwind(AssertUnwindSafe(|| job(&mut workspace))) {
-            Ok(true) => load.took(ticket.cost, began.elapsed()),
-            Ok(false) => {}
+        let done = catch_unwind(AssertUnwindSafe(|| job(&mut workspace))).unwrap_or_else(|_| {
             // The panic hook has told of the panic; what the job left in the workspace is not trusted.
-            Err(_) => {
-                load.panics.inc();
-                workspace = Workspace::default();
-            }
+            load.panics.inc();
+            workspace = Workspace::default();
+            NOTHING
+        });
+        if done.as_expected {
+            load.took(ticket.cost, began.elapsed());
         }
-        load.busy_until_us[index].store(0, Ordering::Relaxed);
+        load.idle(index);
+        if let Some(tell) = done.tell {
+            tell();
+        }
     }
 }

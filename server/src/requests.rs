@@ -59,7 +59,7 @@ impl App {
         let body = self.bodies.json(headers, body).await?;
         let (arrived, limits, scenes) = (Instant::now(), self.batch_limits, Arc::clone(&self.scenes));
         let plan = move |_: &mut Workspace, _: &dyn Fn() -> bool| batch::plan(body.as_ref(), limits.poses, &scenes);
-        let batch = self.pool.run(self.usual_ticket(None), plan).await??;
+        let batch = self.pool.run(self.usual_ticket(), plan).await??;
         let counters = (Arc::clone(&self.times), Arc::clone(&self.metrics));
         batch::answers(batch, Arc::clone(&self.pool), counters, limits, arrived).map(Body::from_stream)
     }

@@ -6,7 +6,6 @@ use std::io;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use retina_core::predict::budget::DEFAULT_LEVEL;
 use retina_core::predict::{Level, Workspace};
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
@@ -137,9 +136,9 @@ impl App {
         }))
     }
 
-    /// The ticket of a prediction at this level, or at the usual one, that may wait as long as any.
-    pub(crate) fn usual_ticket(&self, level: Option<Level>) -> Ticket {
-        Ticket { cost: self.times.mean(level.unwrap_or(DEFAULT_LEVEL)), longest_wait: self.longest_wait }
+    /// The ticket of what reads a message and prepares its scene.
+    pub(crate) fn usual_ticket(&self) -> Ticket {
+        Ticket { cost: self.times.mean(Level::Linear), longest_wait: self.longest_wait }
     }
 
     /// What bounds the connections.

@@ -9,6 +9,7 @@ mod answers;
 mod batch;
 mod budgets;
 mod catalog;
+mod clients;
 mod faults;
 mod harness;
 mod load;

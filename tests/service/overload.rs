@@ -20,17 +20,19 @@ fn at_three_times_its_capacity_the_service_does_its_work_and_refuses_the_rest_at
     let turns = measure(&plan);
     for turn in &turns {
         assert!(turn.other.is_empty(), "{turn:#?}");
-        assert!(turn.refused > turn.sent / 3, "{turn:#?}");
         // What is let in has not waited for longer, whatever the machine did; a millisecond is the way to the stopwatch.
         assert!(turn.longest_queue_ms < MAX_WAIT_MS + 1.0, "{turn:#?}");
     }
-    let share = median(&turns, |turn| turn.goodput / turn.capacity);
-    assert!(share >= 0.9, "{share} of its capacity: {turns:#?}");
+    let refused = median(&turns, |turn| turn.refused as f64 / turn.sent as f64);
+    assert!(refused > 0.33, "{refused} refused, of which two thirds are too many: {turns:#?}");
+    // Goodput over capacity, both in time of the one thread: other work on the machine slows both alike.
+    let useful = median(&turns, |turn| turn.useful);
+    assert!(useful >= 0.9, "at useful work for {useful} of the time: {turns:#?}");
     // The bound on the wait and the slowest work, as clients see it that wait for each answer.
     let over = median(&turns, |turn| turn.p99_ms / (MAX_WAIT_MS + turn.calm_p99_ms));
     assert!(over <= 1.0, "{over} of the bound: {turns:#?}");
-    let refusal = median(&turns, |turn| turn.refused_p99_ms);
-    assert!(refusal < MAX_WAIT_MS, "a refusal takes {refusal} ms: {turns:#?}");
+    let refusal = median(&turns, |turn| turn.refused_p50_ms);
+    assert!(refusal < 0.25 * MAX_WAIT_MS, "a refusal takes {refusal} ms: {turns:#?}");
 }
 
 #[test]

@@ -37,12 +37,17 @@ pub struct Turn {
     pub goodput: f64,
     /// 99 of 100 of them come within this time (ms).
     pub p99_ms: f64,
+    /// Share of the time in which the one numerical thread worked on answers that were delivered: what goodput is of capacity, whatever else the
+    /// machine does meanwhile.
+    pub useful: f64,
     /// The longest that one of them waited for a thread, by the service's clock (ms).
     pub longest_queue_ms: f64,
     /// Requests sent in overload.
     pub sent: usize,
     /// Requests refused, each with the time to come back.
     pub refused: usize,
+    /// Half of the refusals come within this time (ms).
+    pub refused_p50_ms: f64,
     /// 99 of 100 refusals come within this time (ms).
     pub refused_p99_ms: f64,
     /// Whatever else came back.
@@ -51,7 +56,7 @@ pub struct Turn {
 
 /// What came back to one request.
 enum Reply {
-    Answered { ms: f64, queue_ms: f64 },
+    Answered { ms: f64, queue_ms: f64, work_ms: f64 },
     Refused { ms: f64 },
     Other(String),
 }
@@ -73,7 +78,10 @@ fn ask(agent: &ureq::Agent, address: SocketAddr, index: u64) -> Reply {
     match (status, again) {
         (200, _) => {
             let answer: Value = serde_json::from_str(&text).unwrap_or_default();
-            Reply::Answered { ms, queue_ms: answer["time_us"]["stages"]["queue"].as_f64().unwrap_or(f64::NAN) * 1e-3 }
+            let time = &answer["time_us"];
+            let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN) * 1e-3;
+            let queue_ms = number(&time["stages"]["queue"]);
+            Reply::Answered { ms, queue_ms, work_ms: number(&time["total"]) - queue_ms }
         }
         (503, true) => Reply::Refused { ms },
         _ => Reply::Other(format!("{status}: {text}")),
@@ -130,8 +138,9 @@ fn flood(plan: &Plan, turn: &mut Turn) {
     turn.sent = replies.len();
     for reply in replies {
         match reply {
-            Reply::Answered { ms, queue_ms } => {
+            Reply::Answered { ms, queue_ms, work_ms } => {
                 answered.push(ms);
+                turn.useful += work_ms * 1e-3 / seconds;
                 turn.longest_queue_ms = turn.longest_queue_ms.max(queue_ms);
             }
             Reply::Refused { ms } => refused.push(ms),
@@ -141,6 +150,7 @@ fn flood(plan: &Plan, turn: &mut Turn) {
     turn.goodput = answered.len() as f64 / seconds;
     turn.p99_ms = quantile(&answered, 0.99);
     turn.refused = refused.len();
+    turn.refused_p50_ms = quantile(&refused, 0.5);
     turn.refused_p99_ms = quantile(&refused, 0.99);
 }
 

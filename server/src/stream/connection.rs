@@ -16,6 +16,7 @@ use tokio::time::{interval_at, timeout};
 
 use super::binary;
 use super::session::{Open, Posed, Session, open, problem_text};
+use crate::admission;
 use crate::problem::{Kind, Problem};
 use crate::read::read;
 use crate::state::AppState;
@@ -264,7 +265,7 @@ fn open_on(app: AppState, opening: Open) -> Work {
     Box::pin(async move {
         let scenes = Arc::clone(&app.scenes);
         let job = move |_: &mut _, _: &dyn Fn() -> bool| open(opening, &scenes);
-        let opened = app.pool.run(app.usual_ticket(None), job).await;
+        let opened = app.pool.run(app.usual_ticket(), job).await;
         Done::Opened(opened.unwrap_or_else(|error| Err(error.into())))
     })
 }
@@ -272,7 +273,7 @@ fn open_on(app: AppState, opening: Open) -> Work {
 fn answer_on(app: AppState, session: Arc<Session>, posed: Posed, dropped: u32) -> Work {
     Box::pin(async move {
         let (times, metrics, asked) = (Arc::clone(&app.times), Arc::clone(&app.metrics), posed.clone());
-        let (limit, ticket) = (app.time_limit, app.usual_ticket(session.level()));
+        let (limit, ticket) = (app.time_limit, admission::of_budget(session.budget(), &times, app.longest_wait));
         let job = move |workspace: &mut _, abandoned: &dyn Fn() -> bool| {
             let mut stopwatch = Stopwatch::start(asked.arrived, limit, abandoned);
             session.answer(&asked, dropped, (&times, &metrics), workspace, &mut stopwatch)

@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::extract::ws::{Message, Utf8Bytes};
-use retina_core::predict::{Level, PreparedScene, Workspace};
+use retina_core::predict::budget::Budget;
+use retina_core::predict::{PreparedScene, Workspace};
 use retina_core::progress::Progress as _;
 
 use super::binary::{self, Head};
@@ -70,9 +71,9 @@ pub fn open(open: Open, scenes: &Scenes) -> Result<(Session, Message), Problem> 
 }
 
 impl Session {
-    /// The level that answers, where it is given.
-    pub fn level(&self) -> Option<Level> {
-        self.opening.shared.budget.level
+    /// What every answer must keep.
+    pub fn budget(&self) -> &Budget {
+        &self.opening.shared.budget
     }
 
     /// The message that answers a pose.

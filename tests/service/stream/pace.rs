@@ -80,3 +80,24 @@ fn a_slow_reader_holds_nothing_up_and_gets_the_newest() {
         assert_eq!(read_until(&mut slow, count + 1).await.0, [count + 1], "the stream goes on");
     });
 }
+
+#[test]
+fn a_pose_that_would_be_answered_too_late_is_refused_and_the_stream_goes_on() {
+    with_client(&["--threads", "1"], async |service, mut client| {
+        client.open(json!({"accuracy": {"level": "linear", "max_time_ms": 20.0}})).await.expect("session");
+        let mut long = StreamClient::connect(service.address).await.expect("handshake");
+        long.open(level("reference")).await.expect("session");
+        long.send(&pose(1)).await.expect("sent");
+        tokio::time::sleep(Duration::from_millis(150)).await;
+        client.send(&pose(1)).await.expect("sent");
+        let reply = text(client.receive().await)["problem"].clone();
+        assert_eq!(
+            (&reply["sequence"], &reply["problem"]["type"]),
+            (&json!(1), &json!("/problems/too-late")),
+            "{reply}"
+        );
+        assert_eq!(text(long.receive().await)["answer"]["sequence"], 1);
+        client.send(&pose(2)).await.expect("sent");
+        assert_eq!(text(client.receive().await)["answer"]["sequence"], 2);
+    });
+}
