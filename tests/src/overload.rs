@@ -33,12 +33,14 @@ pub struct Turn {
     pub capacity: f64,
     /// 99 of 100 such answers come within this time (ms).
     pub calm_p99_ms: f64,
+    /// Share of that time in which the one numerical thread worked on them.
+    pub calm_useful: f64,
     /// Answers a second in overload.
     pub goodput: f64,
     /// 99 of 100 of them come within this time (ms).
     pub p99_ms: f64,
-    /// Share of the time in which the one numerical thread worked on answers that were delivered: what goodput is of capacity, whatever else the
-    /// machine does meanwhile.
+    /// Share of that time in which the one numerical thread worked on answers that were delivered. Over `calm_useful` it is what goodput is of
+    /// capacity, however fast the machine is in either turn.
     pub useful: f64,
     /// The longest that one of them waited for a thread, by the service's clock (ms).
     pub longest_queue_ms: f64,
@@ -98,19 +100,23 @@ fn calm(plan: &Plan, turn: &mut Turn) {
     let client = || {
         let (agent, mut times) = (agent(), Vec::new());
         while Instant::now() < until {
-            if let Reply::Answered { ms, .. } = ask(&agent, plan.address, counter.fetch_add(1, Ordering::Relaxed)) {
-                times.push(ms);
+            let index = counter.fetch_add(1, Ordering::Relaxed);
+            if let Reply::Answered { ms, work_ms, .. } = ask(&agent, plan.address, index) {
+                times.push((ms, work_ms));
             }
         }
         times
     };
     let started = Instant::now();
-    let times: Vec<f64> = thread::scope(|scope| {
+    let replies: Vec<(f64, f64)> = thread::scope(|scope| {
         let clients: Vec<_> = (0..2).map(|_| scope.spawn(client)).collect();
         clients.into_iter().flat_map(|client| client.join().unwrap_or_default()).collect()
     });
-    turn.capacity = times.len() as f64 / started.elapsed().as_secs_f64();
+    let seconds = started.elapsed().as_secs_f64();
+    let times: Vec<f64> = replies.iter().map(|(ms, _)| *ms).collect();
+    turn.capacity = times.len() as f64 / seconds;
     turn.calm_p99_ms = quantile(&times, 0.99);
+    turn.calm_useful = replies.iter().map(|(_, work_ms)| work_ms * 1e-3).sum::<f64>() / seconds;
 }
 
 /// Requests at a fixed rate.

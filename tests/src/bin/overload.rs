@@ -26,16 +26,17 @@ fn main() {
     let turn = Duration::from_secs_f64(seconds);
     let turns = measure(&Plan { address, turn, turns, times_capacity: 3.0, clients: 48 });
     println!(
-        "| capacity /s | p99 ms | at three times that: answered /s | share of capacity | thread at useful work | p99 ms | longest in the queue ms | refused | refusal median / p99 ms | other |"
+        "| capacity /s | p99 ms | at three times that: answered /s | share of capacity | thread at useful work, before / then | p99 ms | longest in the queue ms | refused | refusal median / p99 ms | other |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
     for turn in &turns {
         println!(
-            "| {:.1} | {:.1} | {:.1} | {:.2} | {:.2} | {:.1} | {:.1} | {} of {} | {:.1} / {:.1} | {} |",
+            "| {:.1} | {:.1} | {:.1} | {:.2} | {:.2} / {:.2} | {:.1} | {:.1} | {} of {} | {:.1} / {:.1} | {} |",
             turn.capacity,
             turn.calm_p99_ms,
             turn.goodput,
             turn.goodput / turn.capacity,
+            turn.calm_useful,
             turn.useful,
             turn.p99_ms,
             turn.longest_queue_ms,
@@ -46,8 +47,9 @@ fn main() {
             turn.other.len()
         );
     }
-    let (share, useful) = (median(&turns, |turn| turn.goodput / turn.capacity), median(&turns, |turn| turn.useful));
-    println!("medians: {share:.2} of the capacity, the thread at useful work for {useful:.2} of the time");
+    let share = median(&turns, |turn| turn.goodput / turn.capacity);
+    let useful = median(&turns, |turn| turn.useful / turn.calm_useful);
+    println!("medians: {share:.2} of the capacity in answers, {useful:.2} in the thread's time");
 }
 
 /// The service as the program runs it: one thread that talks.
