@@ -16,6 +16,10 @@ use crate::understand::MAX_TIME;
 /// Longest body that is looked at, bytes.
 const SHORT: usize = 16 << 10;
 
+/// What it may take to hand a job to an idle thread while the machine is busy: a shorter promise is kept or broken by the level chosen, and is no
+/// reason to refuse.
+const HAND_OVER: Duration = Duration::from_millis(20);
+
 /// The part of a request that is looked at.
 #[derive(Default, Deserialize)]
 struct Glance {
@@ -49,7 +53,7 @@ pub fn of_budget(budget: &Budget, times: &Times, longest_wait: Option<Duration>)
     Ticket {
         // Who asks for no level gets one that is in time.
         cost: if budget.level.is_none() { max_time.map_or(usual, |most| usual.min(most)) } else { usual },
-        longest_wait: shorter(max_time, longest_wait),
+        longest_wait: shorter(max_time.map(|time| time.max(HAND_OVER)), longest_wait),
     }
 }
 
