@@ -68,6 +68,22 @@ pub fn predict(
     stopwatch: &mut Stopwatch,
     layout: Layout,
 ) -> Result<Answer, Problem> {
+    let (request, prediction) = compute(scene, question, workspace, stopwatch)?;
+    let response = PredictResponse::new(&prediction, stopwatch.finish());
+    let bytes = write(&response, layout).map_err(Problem::internal)?;
+    Ok(Answer { bytes, request, prediction })
+}
+
+/// As [`predict`], without writing it down: the request with the level chosen, and what the core says.
+///
+/// # Errors
+/// The problem that the caller is told of.
+pub fn compute(
+    scene: &PreparedScene,
+    question: Question,
+    workspace: &mut Workspace,
+    stopwatch: &mut Stopwatch,
+) -> Result<(Request, Prediction), Problem> {
     let Question { mut request, mut budget, times } = question;
     let mut broken = Vec::new();
     request.level = match budget.level {
@@ -86,7 +102,5 @@ pub fn predict(
     let mut prediction = scene.predict(&request, workspace, stopwatch).map_err(from_predict)?;
     times.record(request.level, start.elapsed());
     prediction.warnings.append(&mut broken);
-    let response = PredictResponse::new(&prediction, stopwatch.finish());
-    let bytes = write(&response, layout).map_err(Problem::internal)?;
-    Ok(Answer { bytes, request, prediction })
+    Ok((request, prediction))
 }

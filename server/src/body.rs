@@ -26,8 +26,13 @@ const LARGE_BYTES: usize = 256 << 10;
 /// Large bodies that may be held at once, in arrival, waiting or at work; one more is answered with 503.
 pub const LARGE_AT_ONCE: usize = 12;
 
-/// How long a body may take to arrive.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// What bounds the bodies of a service.
+pub struct Bodies {
+    /// A permit for each large body that may be held.
+    large: Arc<Semaphore>,
+    /// How long one may take to arrive.
+    patience: Duration,
+}
 
 /// A body that has arrived. It counts as held until it is dropped.
 pub struct Received {
@@ -41,24 +46,31 @@ impl AsRef<[u8]> for Received {
     }
 }
 
-/// The body of a request that announces JSON; `large` has a permit for each large body that may be held.
-///
-/// # Errors
-/// [`Kind::UnsupportedMediaType`], [`Kind::BodyTooLarge`], [`Kind::RequestTimeout`], [`Kind::Busy`] for a large body too many, or
-/// [`Kind::MalformedJson`] for one that breaks off.
-pub async fn json(headers: &HeaderMap, body: Body, large: &Arc<Semaphore>) -> Result<Received, Problem> {
-    let given = headers.get(header::CONTENT_TYPE);
-    if !given.is_some_and(|value| value.to_str().is_ok_and(is_json)) {
-        let given = given.map_or("none".into(), |value| String::from_utf8_lossy(value.as_bytes()));
-        let detail = format!("The request's Content-Type is {given}; it must be application/json.");
-        return Err(Problem::new(Kind::UnsupportedMediaType, detail));
+impl Bodies {
+    /// None held; each may take this long.
+    pub fn new(patience: Duration) -> Self {
+        Self { large: Arc::new(Semaphore::new(LARGE_AT_ONCE)), patience }
     }
-    match timeout(PATIENCE, collect(body, large)).await {
-        Ok(result) => result,
-        Err(_) => Err(Problem::new(
-            Kind::RequestTimeout,
-            format!("The body did not arrive within {} seconds.", PATIENCE.as_secs()),
-        )),
+
+    /// The body of a request that announces JSON.
+    ///
+    /// # Errors
+    /// [`Kind::UnsupportedMediaType`], [`Kind::BodyTooLarge`], [`Kind::RequestTimeout`], [`Kind::Busy`] for a large body too many, or
+    /// [`Kind::MalformedJson`] for one that breaks off.
+    pub async fn json(&self, headers: &HeaderMap, body: Body) -> Result<Received, Problem> {
+        let given = headers.get(header::CONTENT_TYPE);
+        if !given.is_some_and(|value| value.to_str().is_ok_and(is_json)) {
+            let given = given.map_or("none".into(), |value| String::from_utf8_lossy(value.as_bytes()));
+            let detail = format!("The request's Content-Type is {given}; it must be application/json.");
+            return Err(Problem::new(Kind::UnsupportedMediaType, detail));
+        }
+        match timeout(self.patience, collect(body, &self.large)).await {
+            Ok(result) => result,
+            Err(_) => Err(Problem::new(
+                Kind::RequestTimeout,
+                format!("The body did not arrive within {} seconds.", self.patience.as_secs_f64()),
+            )),
+        }
     }
 }
 

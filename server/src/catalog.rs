@@ -1,5 +1,8 @@
 //! What there is to choose from, told from the core's own tables.
 
+use std::time::Duration;
+
+use retina_core::effects::EFFECT_NAMES;
 use retina_core::needle::shaft::{STIFFNESS, stiffness_mn_per_mm};
 use retina_core::needle::shape::{BEVEL_ANGLE, EDGE_RADIUS, RADIUS};
 use retina_core::needle::{GAUGES, TIP_COORDINATE};
@@ -18,9 +21,12 @@ use retina_core::tissue::ranges::{
 use retina_core::tissue::rate::{DENSITY, PronyTerm, RELAXATION_SHARE, RELAXATION_TIME, RateProperties, VITREOUS_DRAG};
 use retina_core::tissue::{Layer, Tissue};
 
+use crate::body::LIMIT_BYTES;
+use crate::config::Config;
+use crate::stream::LONGEST_MESSAGE;
 use crate::understand::{DEFAULT_GAUGE, DEFAULT_SCENE, FORCE, MAX_ERROR, MAX_TIME};
 use crate::wire::catalog::{
-    GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
+    About, AboutLimits, GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
 };
 use crate::wire::scene::{
     BondSpec, LayerSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec,
@@ -70,6 +76,32 @@ pub fn gauges() -> GaugeList {
         stiffness_mn_per_mm: stiffness_mn_per_mm(gauge.radius_mm()),
     });
     GaugeList { default: DEFAULT_GAUGE, gauges: gauges.into() }
+}
+
+/// What the service is and what it allows.
+pub fn about(config: &Config) -> About {
+    let millis = |time: Duration| time.as_millis() as u64;
+    About {
+        name: env!("CARGO_PKG_NAME"),
+        version: env!("CARGO_PKG_VERSION"),
+        commit: option_env!("RETINA_COMMIT"),
+        features: if cfg!(feature = "rerun") { vec!["rerun"] } else { Vec::new() },
+        levels: Level::ALL.map(Level::name).into(),
+        effects: EFFECT_NAMES.into(),
+        limits: AboutLimits {
+            threads: config.threads(),
+            queue: config.queue.into(),
+            max_wait_ms: config.max_wait().map(millis),
+            time_limit_ms: millis(config.time_limit()),
+            simulation_time_limit_ms: millis(config.simulation_time_limit()),
+            simulation_steps: config.simulation_steps.into(),
+            batch_poses: config.batch_poses.into(),
+            streams: config.streams.into(),
+            stream_idle_ms: millis(config.stream_idle()),
+            stream_message_bytes: LONGEST_MESSAGE,
+            body_bytes: LIMIT_BYTES,
+        },
+    }
 }
 
 /// A scene as a request would write it out.

@@ -5,13 +5,13 @@
 //! sequence that breaks off has its error as last line and ends with 1.
 
 use std::fs;
+use std::future::pending;
 use std::io::{self, IsTerminal as _, Read, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use clap::Parser as _;
 use retina_core::predict::{PreparedScene, Workspace};
 use retina_core::progress::Progress as _;
 use retina_core::scene::{Scene, SceneSurface};
@@ -20,6 +20,7 @@ use tokio_util::sync::CancellationToken;
 use tracing_subscriber::EnvFilter;
 
 use crate::answer::{Question, predict};
+use crate::config::table;
 use crate::config::{Command, CommandLine, Config, LogForm, PredictArgs, ReviewArgs, SimulateArgs};
 use crate::problem::{Kind, Problem, from_predict};
 use crate::read::read;
@@ -50,7 +51,7 @@ pub struct Streams<'a> {
 
 /// Runs the program as its command line says.
 pub fn main() -> ExitCode {
-    let CommandLine { command, config } = CommandLine::parse();
+    let CommandLine { command, config } = CommandLine::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
     match command {
         Some(Command::Predict(args)) => {
             let streams = Streams { input: &mut io::stdin(), output: &mut io::stdout(), problems: &mut io::stderr() };
@@ -67,6 +68,11 @@ pub fn main() -> ExitCode {
                 Err(_) => ExitCode::FAILURE,
             }
         }
+        Some(Command::Settings) => {
+            // A pipe that is closed early wants no more of it.
+            let _ = io::stdout().write_all(table::settings().as_bytes());
+            ExitCode::SUCCESS
+        }
         Some(Command::Serve(config)) => serve(&config),
         None => serve(&config),
     }
@@ -81,7 +87,7 @@ fn serve(config: &Config) -> ExitCode {
             return ExitCode::from(COMMAND_LINE_AT_FAULT);
         }
     };
-    let ended = serve_until_ctrl_c(config, recorder.clone());
+    let ended = serve_until_told(config, recorder.clone());
     if let Some(recorder) = recorder {
         let Totals { written, dropped, failed, closed } = recorder.finish(RECORDING_PATIENCE);
         tracing::info!(written, dropped, failed, complete = closed, "the recording ended");
@@ -97,7 +103,7 @@ fn serve(config: &Config) -> ExitCode {
 
 /// One thread talks: the numerical threads do the work, and handing it to one of several talking threads costs a wake-up more.
 #[tokio::main(flavor = "current_thread")]
-async fn serve_until_ctrl_c(config: &Config, recorder: Option<Recorder>) -> io::Result<()> {
+async fn serve_until_told(config: &Config, recorder: Option<Recorder>) -> io::Result<()> {
     let listener = tokio::net::TcpListener::bind(config.listen).await?;
     let address = listener.local_addr()?;
     tracing::info!("listening on http://{address}, the API is at http://{address}/docs");
@@ -106,14 +112,37 @@ async fn serve_until_ctrl_c(config: &Config, recorder: Option<Recorder>) -> io::
     }
     let shutdown = CancellationToken::new();
     let stop = shutdown.clone();
+    if config.tokens.is_empty() && !address.ip().is_loopback() {
+        tracing::warn!("whoever reaches {address} may ask: there is no token, see --token");
+    }
     tokio::spawn(async move {
-        // Without a way to hear of ctrl-c the service runs on, as it must.
-        if tokio::signal::ctrl_c().await.is_ok() {
-            tracing::info!("stopping after what was accepted");
-            stop.cancel();
-        }
+        told_to_stop().await;
+        tracing::info!("stopping after what was accepted");
+        stop.cancel();
     });
     run(listener, App::start_recorded(config, recorder)?, shutdown).await
+}
+
+/// Returns when somebody presses ctrl-c or, on Unix, sends SIGTERM. Without a way to hear of either the service runs on, as it must.
+async fn told_to_stop() {
+    let interrupted = async {
+        if tokio::signal::ctrl_c().await.is_err() {
+            pending().await
+        }
+    };
+    #[cfg(unix)]
+    let terminated = async {
+        match tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate()) {
+            Ok(mut terminate) => terminate.recv().await,
+            Err(_) => pending().await,
+        }
+    };
+    #[cfg(not(unix))]
+    let terminated = pending::<()>();
+    tokio::select! {
+        () = interrupted => {}
+        _ = terminated => {}
+    }
 }
 
 #[cfg(feature = "rerun")]

@@ -1,15 +1,21 @@
-//! What the program can be told, on the command line or by environment variables. The only place that reads either.
+//! What the program can be told, on the command line, by environment variables or by a file. The only place that reads any of them.
+//!
+//! What is on the command line goes before what is in the environment, that before what is in the file, that before the default. Read
+//! `service` (every setting of the service), `file` (how a file is laid under the command line), `table` (the settings for people).
 
-use std::net::SocketAddr;
+mod file;
+mod service;
+pub mod table;
+
 use std::path::PathBuf;
-use std::thread::available_parallelism;
-use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use retina_core::predict::Level;
 
 use crate::recording::Destination;
 use crate::understand::DEFAULT_SCENE;
+
+pub use service::{Config, LogForm};
 
 /// Needle pose and force in, deformed retina surface and normals out.
 #[derive(Debug, Parser)]
@@ -34,50 +40,8 @@ pub enum Command {
     Review(ReviewArgs),
     /// Simulate a sequence from a file and end: one JSON object a line goes to standard output as it is computed.
     Simulate(SimulateArgs),
-}
-
-/// How to serve.
-#[derive(Clone, Debug, Args)]
-pub struct Config {
-    /// Address and port to listen on; port 0 takes a free one.
-    #[arg(long, env = "RETINA_LISTEN", default_value = "127.0.0.1:8080")]
-    pub listen: SocketAddr,
-    /// Numerical threads; as many as the machine has cores when left out.
-    #[arg(long, env = "RETINA_THREADS", value_parser = clap::value_parser!(u16).range(1..))]
-    pub threads: Option<u16>,
-    /// Requests that may wait for a numerical thread; one more is answered with 503.
-    #[arg(long, env = "RETINA_QUEUE", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
-    pub queue: u16,
-    /// Memory for the prepared scenes of requests, MiB. The built-in ones come on top.
-    #[arg(long, env = "RETINA_SCENE_CACHE_MIB", default_value_t = 64)]
-    pub scene_cache_mib: u16,
-    /// Milliseconds after which the work on a request is stopped.
-    #[arg(long, env = "RETINA_TIME_LIMIT_MS", default_value_t = 30_000, value_parser = clap::value_parser!(u32).range(1..))]
-    pub time_limit_ms: u32,
-    /// Steps that a simulation may have.
-    #[arg(long, env = "RETINA_SIMULATION_STEPS", default_value_t = 2000, value_parser = clap::value_parser!(u16).range(1..))]
-    pub simulation_steps: u16,
-    /// Milliseconds after which a simulation is stopped.
-    #[arg(long, env = "RETINA_SIMULATION_TIME_LIMIT_MS", default_value_t = 300_000, value_parser = clap::value_parser!(u32).range(1..))]
-    pub simulation_time_limit_ms: u32,
-    /// Form of the log on standard error. RUST_LOG says what is logged; `retina_server=debug` has a line for each request.
-    #[arg(long, env = "RETINA_LOG", default_value = "pretty")]
-    pub log: LogForm,
-    /// Record what is asked and answered in this file, for the rerun viewer (cargo feature `rerun`).
-    #[arg(long, env = "RETINA_RECORD", value_name = "FILE.rrd", conflicts_with = "record_connect")]
-    pub record: Option<PathBuf>,
-    /// Record to a running viewer, as rerun+http://127.0.0.1:9876/proxy (cargo feature `rerun`).
-    #[arg(long, env = "RETINA_RECORD_CONNECT", value_name = "URL")]
-    pub record_connect: Option<String>,
-}
-
-/// Form of the log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum LogForm {
-    /// For people.
-    Pretty,
-    /// One JSON object a line.
-    Json,
+    /// Print every setting of the service with its environment variable and its default, as a table in Markdown.
+    Settings,
 }
 
 /// One request without HTTP.
@@ -169,32 +133,4 @@ pub struct SimulateArgs {
     /// A mesh in mm (.ply, text or binary, or .obj) in place of the scene's surface.
     #[arg(long)]
     pub mesh: Option<PathBuf>,
-}
-
-impl Config {
-    /// Where to record what is asked and answered.
-    pub fn recording(&self) -> Option<Destination> {
-        destination(self.record.as_ref(), self.record_connect.as_ref())
-    }
-
-    /// Numerical threads.
-    pub fn threads(&self) -> usize {
-        let cores = || available_parallelism().map_or(1, usize::from);
-        self.threads.map_or_else(cores, usize::from)
-    }
-
-    /// Memory for the prepared scenes of requests, bytes.
-    pub fn scene_cache_bytes(&self) -> usize {
-        usize::from(self.scene_cache_mib) << 20
-    }
-
-    /// How long the work on a request may take.
-    pub fn time_limit(&self) -> Duration {
-        Duration::from_millis(self.time_limit_ms.into())
-    }
-
-    /// How long a simulation may take.
-    pub fn simulation_time_limit(&self) -> Duration {
-        Duration::from_millis(self.simulation_time_limit_ms.into())
-    }
 }

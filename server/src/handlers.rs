@@ -3,15 +3,21 @@
 use axum::Json;
 use axum::body::Body;
 use axum::extract::rejection::PathRejection;
+use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, Method, Uri, header};
 use axum::response::{IntoResponse, Response};
 
+use prometheus_client::metrics::counter::Counter;
+
 use crate::catalog;
+use crate::metrics;
 use crate::problem::{Kind, MEDIA_TYPE, Problem, ProblemDocument};
 use crate::state::AppState;
 use crate::wire::{
-    GaugeList, LevelList, PredictRequest, PredictResponse, Readiness, SceneList, SimulateLine, SimulateRequest,
+    About, BatchRequest, BatchResponse, GaugeList, LevelList, PredictRequest, PredictResponse, Readiness, SceneList,
+    SimulateLine, SimulateRequest,
 };
 
 /// What the surface looks like when a needle at this pose pushes with this force.
@@ -34,6 +40,31 @@ use crate::wire::{
 pub async fn predict(State(app): State<AppState>, headers: HeaderMap, body: Body) -> Result<Response, Problem> {
     let answer = app.answer(&headers, body).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], answer).into_response())
+}
+
+/// What the surface looks like for each of many poses.
+///
+/// The answers come in order and each as soon as those before it are there; a pose that makes no sense has its problem in its place. Closing
+/// the connection stops the work.
+#[utoipa::path(
+    post,
+    path = "/v1/predict/batch",
+    tag = "predict",
+    request_body = BatchRequest,
+    responses(
+        (status = 200, description = "An answer or a problem for each pose", body = BatchResponse<'static>),
+        (status = 400, description = "Not JSON", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 408, description = "The body did not arrive in time", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 413, description = "Larger than 8 MiB", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 415, description = "Not announced as JSON", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 422, description = "A field is wrong, or there are too many poses", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 500, description = "A fault of the server", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 503, description = "Too much work is waiting", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+    )
+)]
+pub async fn batch(State(app): State<AppState>, headers: HeaderMap, body: Body) -> Result<Response, Problem> {
+    let answers = app.batch(&headers, body).await?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], answers).into_response())
 }
 
 /// A timed list of needle poses and forces in, surfaces out: one JSON object a line, each as soon as it is computed.
@@ -61,6 +92,31 @@ pub async fn simulate(State(app): State<AppState>, headers: HeaderMap, body: Bod
     Ok(([(header::CONTENT_TYPE, "application/x-ndjson")], lines).into_response())
 }
 
+/// Poses in, surfaces out, over one WebSocket.
+///
+/// Text messages are `StreamCommand` from the client and `StreamMessage` from the server. The first opens a session, whose answers are text or
+/// binary. Of poses that come faster than they are answered the newest wins; the answer counts the others. What is wrong with a message is
+/// said by a problem and the stream goes on.
+#[utoipa::path(
+    get,
+    path = "/v1/stream",
+    tag = "stream",
+    responses(
+        (status = 101, description = "The connection speaks WebSocket from here on"),
+        (status = 403, description = "A browser's page of another origin", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 426, description = "Not a WebSocket handshake", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+        (status = 503, description = "Too many streams are open", body = ProblemDocument<'static>, content_type = MEDIA_TYPE),
+    )
+)]
+pub async fn stream(
+    State(app): State<AppState>,
+    headers: HeaderMap,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> Result<Response, Problem> {
+    let upgrade = upgrade.map_err(|rejection| Problem::new(Kind::UpgradeRequired, rejection.body_text()))?;
+    app.stream(&headers, upgrade)
+}
+
 /// The built-in scenes, and every parameter of a scene with its default, range and source.
 #[utoipa::path(get, path = "/v1/scenes", tag = "catalog", responses((status = 200, body = SceneList)))]
 pub async fn scenes() -> Json<SceneList> {
@@ -79,13 +135,31 @@ pub async fn gauges() -> Json<GaugeList> {
     Json(catalog::gauges())
 }
 
+/// What the service is: version, features, limits.
+#[utoipa::path(get, path = "/v1/about", tag = "service", responses((status = 200, body = About)))]
+pub async fn about(State(app): State<AppState>) -> Json<About> {
+    Json(app.about().clone())
+}
+
+/// What the service has counted and timed, as OpenMetrics text that Prometheus reads.
+#[utoipa::path(
+    get,
+    path = "/metrics",
+    tag = "service",
+    responses((status = 200, body = String, content_type = "application/openmetrics-text"))
+)]
+pub async fn metrics(State(app): State<AppState>) -> Result<Response, Problem> {
+    let text = app.metrics().text().map_err(Problem::internal)?;
+    Ok(([(header::CONTENT_TYPE, metrics::MEDIA_TYPE)], text).into_response())
+}
+
 /// Whether the service runs.
 #[utoipa::path(get, path = "/healthz", tag = "service", responses((status = 200, body = Readiness)))]
 pub async fn health() -> Json<Readiness> {
     Json(Readiness { status: "ok" })
 }
 
-/// Whether the built-in scenes are prepared.
+/// Whether the built-in scenes are prepared, and the service does not stop.
 #[utoipa::path(
     get,
     path = "/readyz",
@@ -132,7 +206,8 @@ pub async fn method_not_allowed(method: Method, uri: Uri) -> Problem {
     Problem::new(Kind::MethodNotAllowed, format!("{} does not take {method}.", uri.path()))
 }
 
-/// For a handler that panicked: nothing of the panic reaches the caller.
-pub fn panicked(_panic: Box<dyn std::any::Any + Send>) -> Response {
+/// For a handler that panicked: it is counted, and nothing of the panic reaches the caller.
+pub fn panicked(panics: &Counter) -> Response {
+    panics.inc();
     Problem::internal("a handler panicked").into_response()
 }

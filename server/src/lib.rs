@@ -1,23 +1,29 @@
 //! The service: needle pose and force in, deformed retina surface and normals out, over HTTP or from a file.
 //!
-//! Read in this order: `routes` (every URL), `handlers`, [`wire`] (every message), `understand` (from the wire to the core),
-//! `answer` (one request from bytes to bytes), `simulate` (one sequence, line by line), `pool` and `scenes` (where it runs and what
-//! is kept), [`page`] (what a browser sees). [`config`] is what the program can be told, [`problem`] how it says no. [`recording`] is a
-//! guest that looks on, `review` compares levels for the eye.
+//! Read in this order: `routes` (every URL), `handlers`, `requests` (what each sets in motion), [`wire`] (every message), `understand` (from
+//! the wire to the core), `answer` (one request from bytes to bytes), `simulate` (one sequence, line by line), `batch` (many poses at once),
+//! [`stream`] (poses over a WebSocket), `admission` (who is let in), [`pool`] and [`scenes`] (where it runs and what is kept), [`page`] (what
+//! a browser sees). [`config`] is what the program can be told, [`problem`] how it says no, [`access`] who may ask, [`metrics`] what is counted.
+//! [`recording`] is a guest that looks on, `review` compares levels for the eye.
 //!
 //! Not here: numerics, which are `retina_core`'s; this crate only brings questions to it and answers back.
 
+pub mod access;
+mod admission;
 mod answer;
+mod batch;
 mod body;
 mod catalog;
 pub mod cli;
 pub mod config;
 mod handlers;
+pub mod metrics;
 pub mod page;
 pub mod pool;
 pub mod problem;
 mod read;
 pub mod recording;
+mod requests;
 #[cfg(feature = "rerun")]
 pub mod review;
 mod routes;
@@ -26,8 +32,10 @@ pub mod scenes;
 mod simulate;
 mod state;
 mod stopwatch;
+pub mod stream;
 mod times;
 mod understand;
+mod warm_up;
 pub mod wire;
 pub mod write;
 

@@ -1,34 +1,71 @@
 //! The threads that compute, apart from those that talk.
 //!
-//! Contract: at most `queue` jobs wait, and one more is refused at once; each thread owns a [`Workspace`]; a panic ends its job and
-//! not its thread; a job whose caller has gone is not begun, and one that is running can see that it has.
+//! Contract: at most `queue` jobs wait, and one more is refused at once, as is one whose wait is expected to be longer than it can bear; each
+//! thread owns a [`Workspace`]; a panic ends its job and not its thread; a job whose caller has gone, or that has waited for longer than
+//! it can bear all the same, is not begun, and one that is running can see that its caller has gone.
 //!
-//! Not here: what the jobs compute.
+//! Not here: what the jobs compute, and what they are expected to take (`times`).
+
+mod load;
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
+use std::time::{Duration, Instant};
 
 use retina_core::predict::Workspace;
 use thiserror::Error;
 use tokio::sync::oneshot;
+use tokio::time::sleep;
 use tracing::Span;
 
-type Job = Box<dyn FnOnce(&mut Workspace) + Send>;
+pub use load::Load;
+
+type Job = Box<dyn FnOnce(&mut Workspace) -> Done + Send>;
+
+/// What a job leaves to its thread.
+struct Done {
+    /// Whether it did what it was expected to do, so that the time that it took tells how good the expectation was.
+    as_expected: bool,
+    /// Tells its caller, who then finds the thread idle.
+    tell: Option<Box<dyn FnOnce()>>,
+}
+
+/// Of a job whose time tells nothing and who told its caller by itself.
+const NOTHING: Done = Done { as_expected: false, tell: None };
+
+/// Share of the longest wait up to which a job is let in: the rest is for jobs before it that take longer than expected.
+const ADMITTED_SHARE: f64 = 0.75;
+
+/// How long a job that waits for a place in the queue waits before it asks again.
+const PATIENCE: Duration = Duration::from_millis(2);
+
+/// What is known of a job before it runs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ticket {
+    /// What it is expected to take.
+    pub cost: Duration,
+    /// The longest wait after which its result is still of use; `None` for any.
+    pub longest_wait: Option<Duration>,
+}
 
 /// The threads, as seen from those that talk. They end when this is dropped and the queue is empty.
 pub struct Pool {
-    queue: SyncSender<Job>,
+    jobs: SyncSender<(Ticket, Job)>,
+    load: Arc<Load>,
 }
 
 /// Why a job gave no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum PoolError {
-    /// The queue is full.
+    /// The queue is full; the wait is expected to last so long.
     #[error("the queue of the numerical threads is full")]
-    Full,
+    Full(Duration),
+    /// The wait is expected to last so long, or has, which is longer than the job can bear.
+    #[error("the wait for a numerical thread is {0:?}, longer than the job can bear")]
+    TooLate(Duration),
     /// The job panicked, or its thread is gone.
     #[error("the computation panicked")]
     Panicked,
@@ -44,14 +81,26 @@ impl Pool {
         queue: usize,
         first: impl FnOnce(&mut Workspace) + Send + 'static,
     ) -> io::Result<Self> {
-        let (sender, receiver) = sync_channel::<Job>(queue);
+        let threads = threads.max(1);
+        let load = Arc::new(Load::new(threads));
+        let (sender, receiver) = sync_channel::<(Ticket, Job)>(queue);
         let receiver = Arc::new(Mutex::new(receiver));
-        let mut first: Option<Job> = Some(Box::new(first));
-        for index in 0..threads.max(1) {
-            let (receiver, first) = (Arc::clone(&receiver), first.take());
-            thread::Builder::new().name(format!("numerics-{index}")).spawn(move || work(first, &receiver))?;
+        let mut first: Option<Job> = Some(Box::new(|workspace: &mut Workspace| {
+            first(workspace);
+            NOTHING
+        }));
+        for index in 0..threads {
+            let (receiver, load, first) = (Arc::clone(&receiver), Arc::clone(&load), first.take());
+            thread::Builder::new()
+                .name(format!("numerics-{index}"))
+                .spawn(move || work(first, &receiver, &load, index))?;
         }
-        Ok(Self { queue: sender })
+        Ok(Self { jobs: sender, load })
+    }
+
+    /// What waits and what is at work.
+    pub fn load(&self) -> &Load {
+        &self.load
     }
 
     /// Runs `job` on one of the threads. The job is given a question that tells whether its caller has gone.
@@ -60,46 +109,105 @@ impl Pool {
     /// [`PoolError`].
     pub async fn run<T: Send + 'static>(
         &self,
+        ticket: Ticket,
         job: impl FnOnce(&mut Workspace, &dyn Fn() -> bool) -> T + Send + 'static,
     ) -> Result<T, PoolError> {
         let (reply, result) = oneshot::channel();
-        self.begin(move |workspace| {
+        let asked = Instant::now();
+        self.queue(ticket, move |workspace| {
             if reply.is_closed() {
-                return;
+                return NOTHING;
             }
-            let value = job(workspace, &|| reply.is_closed());
-            // The caller may have gone meanwhile; then nobody wants the value.
-            let _ = reply.send(value);
+            let waited = asked.elapsed();
+            let value = match ticket.longest_wait {
+                Some(longest) if waited > longest => Err(PoolError::TooLate(waited)),
+                _ => Ok(job(workspace, &|| reply.is_closed())),
+            };
+            Done {
+                as_expected: value.is_ok() && !reply.is_closed(),
+                // The caller may have gone meanwhile; then nobody wants the value.
+                tell: Some(Box::new(move || drop(reply.send(value)))),
+            }
         })?;
-        result.await.map_err(|_| PoolError::Panicked)
+        result.await.map_err(|_| PoolError::Panicked)?
+    }
+
+    /// As [`Pool::run`], for a job that waits for its place in the queue too; `job` makes it anew for each time of asking.
+    ///
+    /// # Errors
+    /// [`PoolError::Panicked`].
+    pub async fn run_patiently<T, J>(&self, ticket: Ticket, job: impl Fn() -> J) -> Result<T, PoolError>
+    where
+        T: Send + 'static,
+        J: FnOnce(&mut Workspace, &dyn Fn() -> bool) -> T + Send + 'static,
+    {
+        loop {
+            match self.run(ticket, job()).await {
+                Err(PoolError::Full(_)) => sleep(PATIENCE).await,
+                result => return result,
+            }
+        }
     }
 
     /// Begins `job` as soon as a thread is free, without waiting for it. What it has to tell it tells by itself.
     ///
     /// # Errors
     /// [`PoolError`].
-    pub fn begin(&self, job: impl FnOnce(&mut Workspace) + Send + 'static) -> Result<(), PoolError> {
+    pub fn begin(&self, ticket: Ticket, job: impl FnOnce(&mut Workspace) + Send + 'static) -> Result<(), PoolError> {
+        self.queue(ticket, |workspace| {
+            job(workspace);
+            NOTHING
+        })
+    }
+
+    fn queue(
+        &self,
+        ticket: Ticket,
+        job: impl FnOnce(&mut Workspace) -> Done + Send + 'static,
+    ) -> Result<(), PoolError> {
+        let expected = self.load.expected_wait();
+        if ticket.longest_wait.is_some_and(|longest| expected > longest.mul_f64(ADMITTED_SHARE)) {
+            return Err(PoolError::TooLate(expected));
+        }
         let span = Span::current();
         let job = Box::new(move |workspace: &mut Workspace| span.in_scope(|| job(workspace)));
-        self.queue.try_send(job).map_err(|error| match error {
-            TrySendError::Full(_) => PoolError::Full,
-            TrySendError::Disconnected(_) => PoolError::Panicked,
+        // Counted before it is taken, so that the count is never below zero.
+        self.load.queued(ticket, 1);
+        self.jobs.try_send((ticket, job)).map_err(|error| {
+            self.load.queued(ticket, -1);
+            match error {
+                TrySendError::Full(_) => PoolError::Full(expected),
+                TrySendError::Disconnected(_) => PoolError::Panicked,
+            }
         })
     }
 }
 
-fn work(first: Option<Job>, queue: &Mutex<Receiver<Job>>) {
+fn work(first: Option<Job>, queue: &Mutex<Receiver<(Ticket, Job)>>, load: &Load, index: usize) {
     let mut workspace = Workspace::default();
     let mut next = first;
     loop {
-        let taken = next.take().or_else(|| {
+        let taken = next.take().map(|job| (Ticket::default(), job)).or_else(|| {
             let queue = queue.lock().unwrap_or_else(PoisonError::into_inner);
-            queue.recv().ok()
+            let (ticket, job) = queue.recv().ok()?;
+            load.queued(ticket, -1);
+            load.begun(index, ticket);
+            Some((ticket, job))
         });
-        let Some(job) = taken else { return };
-        // The panic hook has told of the panic; what the job left in the workspace is not trusted.
-        if catch_unwind(AssertUnwindSafe(|| job(&mut workspace))).is_err() {
+        let Some((ticket, job)) = taken else { return };
+        let began = Instant::now();
+        let done = catch_unwind(AssertUnwindSafe(|| job(&mut workspace))).unwrap_or_else(|_| {
+            // The panic hook has told of the panic; what the job left in the workspace is not trusted.
+            load.panics.inc();
             workspace = Workspace::default();
+            NOTHING
+        });
+        if done.as_expected {
+            load.took(ticket.cost, began.elapsed());
+        }
+        load.idle(index);
+        if let Some(tell) = done.tell {
+            tell();
         }
     }
 }

@@ -4,8 +4,10 @@
 //! caller's fault is not logged as an error; the server's own is logged once, where it is found, and its cause stays in the log.
 
 mod kind;
+mod pool;
 mod predict;
 mod sequence;
+mod stream;
 
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
@@ -16,6 +18,7 @@ use utoipa::ToSchema;
 pub use kind::Kind;
 pub use predict::{from_out_of_range, from_predict};
 pub use sequence::from_sequence;
+pub use stream::of_pose;
 
 /// Media type of a problem document.
 pub const MEDIA_TYPE: &str = "application/problem+json";
@@ -32,6 +35,8 @@ pub struct Problem {
     pub detail: String,
     /// The fields at fault.
     pub errors: Vec<FieldError>,
+    /// Seconds after which to try again, where that is known.
+    pub retry_after_s: Option<u32>,
 }
 
 /// A field at fault.
@@ -75,7 +80,7 @@ pub struct ProblemDocument<'a> {
 impl Problem {
     /// A problem that no field is at fault for.
     pub fn new(kind: Kind, detail: impl Into<String>) -> Self {
-        Self { kind, detail: detail.into(), errors: Vec::new() }
+        Self { kind, detail: detail.into(), errors: Vec::new(), retry_after_s: None }
     }
 
     /// A problem with one field.
@@ -87,13 +92,30 @@ impl Problem {
         detail: impl Into<String>,
     ) -> Self {
         let error = FieldError { field: field.into(), value, allowed: allowed.into() };
-        Self { kind, detail: detail.into(), errors: vec![error] }
+        Self { kind, detail: detail.into(), errors: vec![error], retry_after_s: None }
+    }
+
+    /// The same problem, with the seconds after which to try again.
+    pub fn retry_after(mut self, seconds: u32) -> Self {
+        self.retry_after_s = Some(seconds);
+        self
     }
 
     /// A fault of the server: logs the cause and keeps it from the caller.
     pub fn internal(cause: impl std::fmt::Display) -> Self {
         tracing::error!(%cause, "request failed");
         Self::new(Kind::Internal, "The server failed to answer; its log says why.")
+    }
+
+    /// The same problem of an object that stands at `parent`: the fields at fault are told from there.
+    pub fn within(mut self, parent: &str) -> Self {
+        for error in &mut self.errors {
+            error.field = match error.field.as_str() {
+                "" => parent.to_owned(),
+                field => format!("{parent}.{field}"),
+            };
+        }
+        self
     }
 
     /// The document that crosses the wire.
@@ -114,9 +136,13 @@ impl IntoResponse for Problem {
         let mut response = (self.kind.status(), body).into_response();
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));
-        if matches!(self.kind, Kind::Busy | Kind::NotReady) {
-            headers.insert(header::RETRY_AFTER, RETRY_AFTER_S.into());
+        if matches!(self.kind, Kind::Busy | Kind::NotReady | Kind::TooLate) {
+            headers.insert(header::RETRY_AFTER, self.retry_after_s.unwrap_or(RETRY_AFTER_S).into());
         }
+        if self.kind == Kind::Unauthorized {
+            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
+        response.extensions_mut().insert(self.kind);
         response
     }
 }

@@ -1,10 +1,12 @@
 //! Every URL of the service, and what surrounds all of them.
 
+use std::any::Any;
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::http::{HeaderName, Request, Response};
 use axum::routing::get;
-use axum::{Json, Router};
+use axum::{Json, Router, middleware};
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
 use tower_http::trace::TraceLayer;
@@ -14,33 +16,45 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
+use crate::access;
 use crate::handlers;
+use crate::metrics;
 use crate::page;
 use crate::state::AppState;
+use crate::wire::stream::{StreamCommand, StreamMessage};
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
 #[derive(OpenApi)]
-#[openapi(info(
-    title = "Retina",
-    description = "A needle at this pose pushes the retina with this force: what does the surface look like now?\n\n\
+#[openapi(
+    info(
+        title = "Retina",
+        description = "A needle at this pose pushes the retina with this force: what does the surface look like now?\n\n\
                    Units everywhere: mm, mN, kPa; errors in µm, times in µs. Patch frame: origin on the inner retinal surface, +z into the \
                    vitreous, so a needle pushes towards -z. Quaternions are x, y, z, w; a needle points along its own -z."
-))]
+    ),
+    components(schemas(StreamCommand, StreamMessage))
+)]
 struct Description;
 
 /// The service: state in, router out.
 pub fn app(state: AppState) -> Router {
     let (routes, api) = OpenApiRouter::with_openapi(Description::openapi())
         .routes(routes!(handlers::predict))
+        .routes(routes!(handlers::batch))
         .routes(routes!(handlers::simulate))
+        .routes(routes!(handlers::stream))
         .routes(routes!(handlers::scenes))
         .routes(routes!(handlers::levels))
         .routes(routes!(handlers::gauges))
+        .routes(routes!(handlers::about))
+        .routes(routes!(handlers::metrics))
         .routes(routes!(handlers::health))
         .routes(routes!(handlers::ready))
         .routes(routes!(handlers::problem))
         .split_for_parts();
+    let (access, metrics) = (state.access().clone(), Arc::clone(state.metrics()));
+    let panics = metrics.panics.clone();
     let docs = utoipa_swagger_ui::Config::from("/openapi.json").validator_url("none");
     let trace = TraceLayer::new_for_http()
         .make_span_with(span)
@@ -50,7 +64,7 @@ pub fn app(state: AppState) -> Router {
             tracing::debug!(status, latency_us = latency.as_micros(), "answered");
         })
         .on_failure(());
-    routes
+    let routes = routes
         .route("/", get(page::index))
         .route("/assets/{name}", get(page::asset))
         .route("/openapi.json", get(|| async { Json(api) }))
@@ -58,7 +72,11 @@ pub fn app(state: AppState) -> Router {
         .fallback(handlers::not_found)
         .method_not_allowed_fallback(handlers::method_not_allowed)
         .with_state(state)
-        .layer(CatchPanicLayer::custom(handlers::panicked))
+        .layer(middleware::from_fn_with_state(access.clone(), access::check))
+        .layer(CatchPanicLayer::custom(move |_panic: Box<dyn Any + Send>| handlers::panicked(&panics)))
+        .layer(middleware::from_fn_with_state(metrics, metrics::count));
+    let routes = if access.origins.is_empty() { routes } else { routes.layer(access.cors()) };
+    routes
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
         .layer(trace)
         .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))

@@ -7,8 +7,9 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use nalgebra::Point3;
 use retina_core::predict::PreparedScene;
-use retina_core::scene::Scene;
+use retina_core::scene::{Scene, SceneSurface};
 
 use crate::problem::{Problem, from_predict};
 use crate::understand::{self, DEFAULT_SCENE};
@@ -137,6 +138,17 @@ impl Entry {
             Some(prepared) if Arc::strong_count(prepared) == 1 => Some(prepared.memory_bytes()),
             Some(_) => None,
         }
+    }
+}
+
+/// Triangles between the nodes of every surface of a scene; none for a mesh, whose patch depends on the contact.
+///
+/// # Errors
+/// Never for a scene that is prepared.
+pub fn shared_triangles(scene: &PreparedScene) -> Result<Vec<[usize; 3]>, Problem> {
+    match scene.scene().surface {
+        SceneSurface::Mesh(_) => Ok(Vec::new()),
+        _ => scene.scene().patch(&Point3::origin()).map(|patch| patch.triangles).map_err(Problem::internal),
     }
 }
 

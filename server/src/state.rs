@@ -1,52 +1,72 @@
-//! What every request shares: the prepared scenes, the threads that compute, and whether the service is ready.
+//! What every request shares: the prepared scenes, the threads that compute, what is counted, and whether the service is ready.
+//!
+//! Not here: what a request sets in motion (`requests`).
 
 use std::io;
 use std::sync::{Arc, OnceLock};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use axum::body::Body;
-use axum::http::HeaderMap;
-use nalgebra::{Point3, Vector3};
-use retina_core::needle::shape::RADIUS;
-use retina_core::needle::{Needle, NeedleShape};
-use retina_core::predict::budget::Budget;
-use retina_core::predict::{Control, EffectChoice, Level, Request, Workspace};
-use retina_core::scene::Scene;
-use tokio::sync::{Semaphore, mpsc};
+use retina_core::predict::{Level, Workspace};
+use tokio::sync::Semaphore;
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
 
-use crate::answer::{Question, answer, predict};
-use crate::body::{self, LARGE_AT_ONCE};
+use crate::access::Access;
+use crate::batch;
+use crate::body::Bodies;
+use crate::catalog;
 use crate::config::Config;
-use crate::pool::{Pool, PoolError};
+use crate::metrics::Metrics;
+use crate::pool::{Pool, Ticket};
 use crate::problem::{Kind, Problem};
 use crate::recording::Recorder;
 use crate::scenes::Scenes;
-use crate::simulate::{FIRST_AND_LAST, Limits, Lines, simulate};
-use crate::stopwatch::Stopwatch;
+use crate::simulate;
 use crate::times::Times;
-use crate::wire::request::SceneChoice;
-use crate::write::Layout;
-
-/// Force of the warm-up on every built-in scene, mN: enough for contact, far from any limit.
-const WARM_UP_FORCE_MN: f64 = 0.1;
-
-/// How long each prediction of the warm-up may take.
-const WARM_UP_LIMIT: Duration = Duration::from_secs(60);
+use crate::warm_up::prepare_built_in;
+use crate::wire::About;
 
 /// Shared by all requests.
 pub type AppState = Arc<App>;
 
 /// The service without its routes.
 pub struct App {
-    scenes: Arc<Scenes>,
-    pool: Pool,
-    large_bodies: Arc<Semaphore>,
+    pub(crate) scenes: Arc<Scenes>,
+    pub(crate) pool: Arc<Pool>,
     warm_up: Arc<OnceLock<Result<(), Problem>>>,
-    times: Arc<Times>,
-    time_limit: Duration,
-    recorder: Option<Recorder>,
-    simulations: Arc<Semaphore>,
-    simulation_limits: Limits,
+    pub(crate) times: Arc<Times>,
+    pub(crate) metrics: Arc<Metrics>,
+    pub(crate) time_limit: Duration,
+    /// How long a prediction may wait for a thread.
+    pub(crate) longest_wait: Option<Duration>,
+    pub(crate) recorder: Option<Recorder>,
+    pub(crate) simulations: Arc<Semaphore>,
+    pub(crate) simulation_limits: simulate::Limits,
+    pub(crate) batch_limits: batch::Limits,
+    pub(crate) streams: Streams,
+    pub(crate) bodies: Bodies,
+    connection_limits: ConnectionLimits,
+    access: Access,
+    about: About,
+}
+
+/// What bounds the connections.
+#[derive(Clone)]
+pub(crate) struct ConnectionLimits {
+    /// One for each that may be open.
+    pub(crate) places: Arc<Semaphore>,
+    /// How long one may bring no request.
+    pub(crate) idle: Duration,
+}
+
+/// What the streams share.
+pub(crate) struct Streams {
+    pub(crate) places: Arc<Semaphore>,
+    /// How long a client may be silent.
+    pub(crate) idle: Duration,
+    pub(crate) open: TaskTracker,
+    /// Cancelled when the service stops.
+    pub(crate) stopping: CancellationToken,
 }
 
 impl App {
@@ -65,7 +85,6 @@ impl App {
     pub fn start_recorded(config: &Config, recorder: Option<Recorder>) -> io::Result<AppState> {
         let scenes = Arc::new(Scenes::new(config.scene_cache_bytes()));
         let warm_up = Arc::new(OnceLock::new());
-        let time_limit = config.time_limit();
         let times = Arc::new(Times::default());
         let first = {
             let (scenes, times, outcome) = (Arc::clone(&scenes), Arc::clone(&times), Arc::clone(&warm_up));
@@ -78,75 +97,85 @@ impl App {
                 let _ = outcome.set(result);
             }
         };
+        let (threads, queue) = (config.threads(), usize::from(config.queue));
+        let pool = Pool::start(threads, queue, first)?;
         Ok(Arc::new(Self {
-            pool: Pool::start(config.threads(), config.queue.into(), first)?,
-            large_bodies: Arc::new(Semaphore::new(LARGE_AT_ONCE)),
+            metrics: Arc::new(Metrics::new(pool.load(), threads, queue)),
+            pool: Arc::new(pool),
+            bodies: Bodies::new(config.body_limit()),
+            connection_limits: ConnectionLimits {
+                places: Arc::new(Semaphore::new(config.connections.into())),
+                idle: config.connection_idle(),
+            },
             scenes,
             warm_up,
             times,
-            time_limit,
+            time_limit: config.time_limit(),
+            longest_wait: config.max_wait(),
             recorder,
             // One thread stays for predictions, where there are several.
-            simulations: Arc::new(Semaphore::new(config.threads().saturating_sub(1).max(1))),
-            simulation_limits: Limits { steps: config.simulation_steps.into(), time: config.simulation_time_limit() },
+            simulations: Arc::new(Semaphore::new(threads.saturating_sub(1).max(1))),
+            simulation_limits: simulate::Limits {
+                steps: config.simulation_steps.into(),
+                time: config.simulation_time_limit(),
+            },
+            batch_limits: batch::Limits {
+                poses: config.batch_poses.into(),
+                each: config.time_limit(),
+                whole: config.simulation_time_limit(),
+                pieces: threads,
+            },
+            streams: Streams {
+                places: Arc::new(Semaphore::new(config.streams.into())),
+                idle: config.stream_idle(),
+                open: TaskTracker::new(),
+                stopping: CancellationToken::new(),
+            },
+            access: config.access(),
+            about: catalog::about(config),
         }))
     }
 
-    /// Answers the request whose body is on its way.
-    ///
-    /// # Errors
-    /// The problem that the caller is told of.
-    pub async fn answer(&self, headers: &HeaderMap, body: Body) -> Result<Vec<u8>, Problem> {
-        let body = body::json(headers, body, &self.large_bodies).await?;
-        let accepted = Instant::now();
-        let (scenes, times, limit) = (Arc::clone(&self.scenes), Arc::clone(&self.times), self.time_limit);
-        let recorder = self.recorder.clone();
-        let job = move |workspace: &mut Workspace, abandoned: &dyn Fn() -> bool| {
-            let mut stopwatch = Stopwatch::start(accepted, limit, abandoned);
-            let answer = answer(body.as_ref(), &scenes, &times, workspace, &mut stopwatch);
-            match recorder {
-                Some(recorder) => recorder.record(body.as_ref(), accepted, answer),
-                None => answer.map(|answer| answer.bytes),
-            }
-        };
-        self.pool.run(job).await.unwrap_or_else(|error| match &self.recorder {
-            Some(recorder) => recorder.record(b"", accepted, Err(from_pool(error))),
-            None => Err(from_pool(error)),
-        })
+    /// The ticket of what reads a message and prepares its scene.
+    pub(crate) fn usual_ticket(&self) -> Ticket {
+        Ticket { cost: self.times.mean(Level::Linear), longest_wait: self.longest_wait }
     }
 
-    /// Simulates the sequence whose body is on its way: the lines of the answer, each as soon as it is there. The work ends when the
-    /// answer is dropped.
-    ///
-    /// # Errors
-    /// The problem of a sequence that does not begin.
-    pub async fn simulate(&self, headers: &HeaderMap, body: Body) -> Result<Body, Problem> {
-        let body = body::json(headers, body, &self.large_bodies).await?;
-        let permit = Arc::clone(&self.simulations).try_acquire_owned().map_err(|_| {
-            Problem::new(
-                Kind::Busy,
-                "As many simulations as the service has threads for are at work; try again in a second.",
-            )
-        })?;
-        let accepted = Instant::now();
-        let (scenes, limits) = (Arc::clone(&self.scenes), self.simulation_limits);
-        // Room for every line: a client that reads slowly does not hold a thread.
-        let (sender, lines) = mpsc::channel(limits.steps + FIRST_AND_LAST);
-        let job = move |_: &mut Workspace| {
-            let gone = || sender.is_closed();
-            let mut stopwatch = Stopwatch::start(accepted, limits.time, &gone);
-            // A line that finds no room has lost its reader.
-            simulate(body.as_ref(), &scenes, limits.steps, &mut stopwatch, &mut |line| sender.try_send(line).is_ok());
-        };
-        self.pool.begin(job).map_err(from_pool)?;
-        Lines::new(lines, permit).body().await
+    /// What bounds the connections.
+    pub(crate) fn connection_limits(&self) -> ConnectionLimits {
+        self.connection_limits.clone()
     }
 
-    /// Whether every built-in scene has answered at the levels that a simulator uses.
+    /// What is counted.
+    pub fn metrics(&self) -> &Arc<Metrics> {
+        &self.metrics
+    }
+
+    /// Who may ask.
+    pub fn access(&self) -> &Access {
+        &self.access
+    }
+
+    /// What this service is and what it allows.
+    pub fn about(&self) -> &About {
+        &self.about
+    }
+
+    /// Tells every stream to end, and waits until they have. From now on the service is not ready.
+    pub async fn end_streams(&self) {
+        self.streams.stopping.cancel();
+        self.streams.open.close();
+        self.streams.open.wait().await;
+    }
+
+    /// Whether every built-in scene has answered at the levels that a simulator uses, and the service does not stop.
     ///
     /// # Errors
     /// [`Kind::NotReady`], or what the warm-up failed with.
     pub fn ready(&self) -> Result<(), Problem> {
+        if self.streams.stopping.is_cancelled() {
+            return Err(Problem::new(Kind::NotReady, "The service is stopping."));
+        }
         match self.warm_up.get() {
             Some(Ok(())) => Ok(()),
             Some(Err(problem)) => Err(Problem::new(
@@ -156,39 +185,4 @@ impl App {
             None => Err(Problem::new(Kind::NotReady, "The built-in scenes are being prepared.")),
         }
     }
-}
-
-fn from_pool(error: PoolError) -> Problem {
-    match error {
-        PoolError::Full => {
-            Problem::new(Kind::Busy, "The queue of the numerical threads is full; try again in a second.")
-        }
-        PoolError::Panicked => Problem::internal(error),
-    }
-}
-
-/// A light touch on every built-in scene, so that what depends on the scene alone is there before the first request.
-fn prepare_built_in(scenes: &Scenes, times: &Times, workspace: &mut Workspace) -> Result<(), Problem> {
-    let shape = NeedleShape::hemispherical(RADIUS.default);
-    let needle = Needle::pointing(shape, Point3::origin(), &-Vector3::z_axis());
-    for name in Scene::built_in_names() {
-        let scene = scenes.get(Some(&SceneChoice::Name((*name).to_owned())))?;
-        for level in Level::ALL.into_iter().filter(|level| *level != Level::Reference) {
-            let optional = level.is_learned();
-            let request = Request {
-                needle,
-                control: Control::Force(Vector3::new(0.0, 0.0, -WARM_UP_FORCE_MN)),
-                level,
-                effects: EffectChoice::Auto,
-            };
-            let budget = Budget { level: Some(level), ..Budget::default() };
-            let mut stopwatch = Stopwatch::start(Instant::now(), WARM_UP_LIMIT, &|| false);
-            let warm = predict(&scene, Question { request, budget, times }, workspace, &mut stopwatch, Layout::Compact);
-            // Without usable weights a learned level has no answer; the others do.
-            if let (Err(problem), false) = (warm, optional) {
-                return Err(problem);
-            }
-        }
-    }
-    Ok(())
 }

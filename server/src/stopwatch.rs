@@ -33,6 +33,11 @@ impl<'a> Stopwatch<'a> {
         &self.stages
     }
 
+    /// The stages that have ended.
+    pub fn stages(&self) -> &[(&'static str, Duration)] {
+        &self.stages
+    }
+
     /// Ends the last stage; gives the stages so far away and goes on with `next`.
     pub fn take(&mut self, next: &'static str) -> Vec<(&'static str, Duration)> {
         self.lap();

@@ -35,6 +35,17 @@ impl Times {
         recent.push_back(time.as_secs_f64() * 1e3);
     }
 
+    /// What a prediction of that level takes on average.
+    pub fn mean(&self, level: Level) -> Duration {
+        let at = Level::ALL.iter().position(|known| *known == level).unwrap_or_default();
+        let recent = self.recent_ms[at].lock().unwrap_or_else(PoisonError::into_inner);
+        let mean_ms = match recent.len() {
+            0 => FIRST_GUESS_MS[at],
+            count => recent.iter().sum::<f64>() / count as f64,
+        };
+        Duration::from_secs_f64(mean_ms * 1e-3)
+    }
+
     /// What each level is expected to take, ms.
     pub fn expected_ms(&self) -> LevelTimes {
         let mut expected = FIRST_GUESS_MS;

@@ -7,6 +7,7 @@
 mod needle;
 mod scene;
 mod sequence;
+mod stream;
 
 use nalgebra::Vector3;
 use retina_core::effects::EFFECT_NAMES;
@@ -17,8 +18,10 @@ use serde_json::json;
 
 pub use scene::{built_in, chosen, scene};
 pub use sequence::sequence;
+pub use stream::{Opening, opening, pose};
 
 use crate::problem::{Kind, Problem, from_out_of_range};
+use crate::wire::batch::BatchPose;
 use crate::wire::fixed::Vector;
 use crate::wire::request::{AccuracySpec, ControlName, EffectsSpec, PredictRequest};
 
@@ -72,6 +75,36 @@ pub fn request(request: &PredictRequest) -> Result<Request, Problem> {
         control: control(request.control, request.force_mn)?,
         level: DEFAULT_LEVEL,
         effects: effects(request.effects.as_ref())?,
+    })
+}
+
+/// What many poses share.
+#[derive(Clone, Debug)]
+pub struct Shared {
+    /// What every answer must keep.
+    pub budget: Budget,
+    /// Which effects are simulated.
+    pub effects: EffectChoice,
+}
+
+/// What many poses share; the scene is looked up apart.
+///
+/// # Errors
+/// A problem that names the field.
+pub fn shared(accuracy: Option<&AccuracySpec>, given: Option<&EffectsSpec>) -> Result<Shared, Problem> {
+    Ok(Shared { budget: budget(accuracy)?, effects: effects(given)? })
+}
+
+/// The core's request of one pose of a batch, its level that of one that asks for none.
+///
+/// # Errors
+/// A problem that names the field.
+pub fn batched(shared: &Shared, pose: &BatchPose) -> Result<Request, Problem> {
+    Ok(Request {
+        needle: needle::needle(&pose.needle)?,
+        control: control(pose.control, pose.force_mn)?,
+        level: DEFAULT_LEVEL,
+        effects: shared.effects.clone(),
     })
 }
 

@@ -5,16 +5,20 @@
 //!
 //! Not here: what the numbers mean to the physics (`understand`), how errors are worded (`read`, `problem`).
 
+pub mod batch;
 pub mod catalog;
 mod either;
 pub mod fixed;
 pub mod object;
+pub mod pose;
 pub mod request;
 pub mod response;
 pub mod scene;
 pub mod sequence;
+pub mod stream;
 
-pub use catalog::{GaugeList, LevelList, Readiness, SceneList};
+pub use batch::{BatchRequest, BatchResponse};
+pub use catalog::{About, GaugeList, LevelList, Readiness, SceneList};
 pub use fixed::{Quaternion, Triangle, Vector};
 pub use request::PredictRequest;
 pub use response::PredictResponse;

@@ -7,12 +7,16 @@ use serde_json::Value;
 use crate::harness::{get, post, predict, request, send};
 use crate::schema::{assert_matches, check, description};
 
-const ROUTES: [(&str, &str); 8] = [
+const ROUTES: [(&str, &str); 12] = [
     ("post", "/v1/predict"),
+    ("post", "/v1/predict/batch"),
     ("post", "/v1/simulate"),
+    ("get", "/v1/stream"),
     ("get", "/v1/scenes"),
     ("get", "/v1/levels"),
     ("get", "/v1/gauges"),
+    ("get", "/v1/about"),
+    ("get", "/metrics"),
     ("get", "/healthz"),
     ("get", "/readyz"),
     ("get", "/problems/{name}"),

@@ -43,14 +43,14 @@ pub fn shared() -> AppState {
     STATE.get_or_init(|| state(&[])).clone()
 }
 
-fn runtime() -> &'static Runtime {
+pub fn runtime() -> &'static Runtime {
     static RUNTIME: OnceLock<Runtime> = OnceLock::new();
     RUNTIME.get_or_init(|| Runtime::new().expect("runtime"))
 }
 
-/// Sends a request to the shared service without a socket.
+/// Sends a request to the shared service without a socket, from anywhere.
 pub fn send(request: Request<Body>) -> Reply {
-    runtime().block_on(async {
+    let send = async {
         let response = app(shared()).oneshot(request).await.expect("infallible");
         let (parts, body) = response.into_parts();
         let bytes = to_bytes(body, usize::MAX).await.expect("body");
@@ -60,7 +60,8 @@ pub fn send(request: Request<Body>) -> Reply {
             headers: parts.headers,
             body: serde_json::from_str(&text).unwrap_or(Value::String(text)),
         }
-    })
+    };
+    tokio::task::block_in_place(|| runtime().block_on(send))
 }
 
 pub fn get(path: &str) -> Reply {

@@ -4,11 +4,18 @@
 //!
 //! Not here: whether the physics is right, which the other tiers say.
 
+mod access;
 mod answers;
+mod batch;
 mod budgets;
 mod catalog;
+mod clients;
+mod faults;
 mod harness;
 mod load;
+mod malformed;
+mod operations;
+mod overload;
 mod page;
 mod program;
 mod properties;
@@ -17,3 +24,4 @@ mod refusals;
 mod schema;
 mod sequences;
 mod sockets;
+mod stream;

@@ -70,13 +70,23 @@ kinds! {
     MethodNotAllowed = "method-not-allowed", METHOD_NOT_ALLOWED, "The page does not take this method",
         "The header Allow lists the methods that it takes.";
     RequestTimeout = "request-timeout", REQUEST_TIMEOUT, "The body did not arrive in time",
-        "The body of a request must arrive within ten seconds.";
+        "The body of a request must arrive within ten seconds, or what the server is configured with.";
     BodyTooLarge = "body-too-large", PAYLOAD_TOO_LARGE, "The body is too large",
         "A body may have 8 MiB. Thin out the mesh, or cut it around the needle: the nodes are the 64 vertices nearest to the contact.";
     UnsupportedMediaType = "unsupported-media-type", UNSUPPORTED_MEDIA_TYPE, "The body is not announced as JSON",
         "Send the header Content-Type: application/json.";
+    Unauthorized = "unauthorized", UNAUTHORIZED, "A token is needed",
+        "This server answers those who have a token: send the header Authorization: Bearer TOKEN.";
+    ForeignOrigin = "foreign-origin", FORBIDDEN, "The page comes from elsewhere",
+        "A browser tells which site its page is from, and this server takes streams from its own pages and from the origins that it is \
+         configured with.";
+    UpgradeRequired = "upgrade-required", UPGRADE_REQUIRED, "The page speaks WebSocket",
+        "GET /v1/stream begins with the WebSocket handshake of RFC 6455, version 13.";
     Busy = "busy", SERVICE_UNAVAILABLE, "Too much work is waiting",
         "The queue of the numerical threads is full. Try again after the seconds in the header Retry-After.";
+    TooLate = "too-late", SERVICE_UNAVAILABLE, "The answer would come too late",
+        "The wait for a numerical thread is longer than `accuracy.max_time_ms`, or than the server lets a request wait. Try again after the \
+         seconds in the header Retry-After, or elsewhere at once.";
     TookTooLong = "took-too-long", SERVICE_UNAVAILABLE, "The answer took too long",
         "The work was stopped at the time limit of the server. Use a cheaper level.";
     NotReady = "not-ready", SERVICE_UNAVAILABLE, "The service is warming up",

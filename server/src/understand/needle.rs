@@ -10,18 +10,44 @@ use super::{DEFAULT_GAUGE, both, rotation, unknown_name};
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::{Quaternion, Vector};
 use crate::wire::request::{BevelledTip, FlatTip, NeedleSpec, TipName, TipShape, TipSpec};
+use crate::wire::stream::ShapeSpec;
 
 /// A direction must be at least this long; shorter ones are rounding.
 const SHORTEST_DIRECTION: f64 = 1e-9;
 
 /// The needle, inside the core's ranges.
 pub(super) fn needle(spec: &NeedleSpec) -> Result<Needle, Problem> {
-    let radius_mm = radius_mm(spec)?;
+    let radius_mm = radius_mm(spec.gauge.as_deref(), spec.radius_mm)?;
     let shape = NeedleShape { radius_mm, tip: tip(spec.tip.as_ref(), radius_mm)? };
-    let tip_mm = Point3::from(spec.tip_mm.0);
-    let orientation = orientation("needle", spec.orientation_xyzw.as_ref(), spec.direction.as_ref())?
-        .unwrap_or_else(|| orientation_pointing(&-Vector3::z_axis()));
-    let stiffness = spec.stiffness_mn_per_mm.unwrap_or_else(|| stiffness_mn_per_mm(radius_mm));
+    let (xyzw, direction) = (spec.orientation_xyzw.as_ref(), spec.direction.as_ref());
+    placed(shape, "needle", spec.tip_mm, xyzw, direction, spec.stiffness_mn_per_mm)
+}
+
+/// A needle's shape without its place, inside the core's ranges.
+///
+/// # Errors
+/// A problem that names the field.
+pub fn shape(spec: &ShapeSpec) -> Result<NeedleShape, Problem> {
+    let radius_mm = radius_mm(spec.gauge.as_deref(), spec.radius_mm)?;
+    let shape = NeedleShape { radius_mm, tip: tip(spec.tip.as_ref(), radius_mm)? };
+    placed(shape, "needle", Vector([0.0; 3]), None, None, None).map(|needle| needle.shape)
+}
+
+/// The needle of that shape at the place that the object at `path` gives; with the usual stiffness of its radius where none is given.
+///
+/// # Errors
+/// A problem that names the field.
+pub fn placed(
+    shape: NeedleShape,
+    path: &str,
+    tip_mm: Vector,
+    xyzw: Option<&Quaternion>,
+    direction: Option<&Vector>,
+    stiffness: Option<f64>,
+) -> Result<Needle, Problem> {
+    let orientation = orientation(path, xyzw, direction)?.unwrap_or_else(|| orientation_pointing(&-Vector3::z_axis()));
+    let stiffness = stiffness.unwrap_or_else(|| stiffness_mn_per_mm(shape.radius_mm));
+    let tip_mm = Point3::from(tip_mm.0);
     let needle = Needle { shape, tip_mm, orientation, stiffness_mn_per_mm: Some(stiffness) };
     needle.validate().map_err(|error| from_out_of_range(tip_field(&error.field, &shape), &error))?;
     Ok(needle)
@@ -42,8 +68,8 @@ pub(super) fn orientation(
     }
 }
 
-fn radius_mm(spec: &NeedleSpec) -> Result<f64, Problem> {
-    let name = match (&spec.gauge, spec.radius_mm) {
+fn radius_mm(gauge: Option<&str>, radius_mm: Option<f64>) -> Result<f64, Problem> {
+    let name = match (gauge, radius_mm) {
         (Some(_), Some(_)) => return Err(both("needle.radius_mm", "needle.gauge")),
         (None, Some(radius_mm)) => return Ok(radius_mm),
         (Some(name), None) => name,

@@ -99,6 +99,54 @@ pub struct GaugeEntry {
     pub stiffness_mn_per_mm: f64,
 }
 
+/// `GET /v1/about`.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct About {
+    /// Name of the program.
+    pub name: &'static str,
+    /// Its version.
+    pub version: &'static str,
+    /// The commit that it was built from, where the build was told by the variable `RETINA_COMMIT`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub commit: Option<&'static str>,
+    /// Cargo features that it was built with.
+    pub features: Vec<&'static str>,
+    /// Names of the levels, cheapest first.
+    pub levels: Vec<&'static str>,
+    /// Names of the effects; their order is that of the bits in a binary answer.
+    pub effects: Vec<&'static str>,
+    /// What it allows.
+    pub limits: AboutLimits,
+}
+
+/// What a service allows.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct AboutLimits {
+    /// Numerical threads.
+    pub threads: usize,
+    /// Jobs that may wait for one.
+    pub queue: usize,
+    /// How long a prediction may wait for a thread, ms; left out where the queue alone bounds it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_wait_ms: Option<u64>,
+    /// How long the work on a prediction may take, ms.
+    pub time_limit_ms: u64,
+    /// How long a simulation or a batch may take, ms.
+    pub simulation_time_limit_ms: u64,
+    /// Steps of a simulation.
+    pub simulation_steps: usize,
+    /// Poses of a batch.
+    pub batch_poses: usize,
+    /// Streams at once.
+    pub streams: usize,
+    /// How long a stream's client may be silent, ms.
+    pub stream_idle_ms: u64,
+    /// Longest message of a stream, bytes.
+    pub stream_message_bytes: usize,
+    /// Largest body of a request, bytes.
+    pub body_bytes: usize,
+}
+
 /// `GET /healthz` and `GET /readyz`.
 #[derive(Serialize, ToSchema)]
 pub struct Readiness {

@@ -1,0 +1,64 @@
+//! How many predictions a second batches give: `cargo run --release -p retina-tests --bin batch_load [-- BATCHES POSES LEVEL]` (20 batches of 1000
+//! poses, `linear`). One after the other on loopback, the service in this process as the program runs it.
+
+use std::net::SocketAddr;
+use std::sync::mpsc::Sender;
+use std::time::{Duration, Instant};
+
+use clap::Parser as _;
+use retina_core::comparison::quantile;
+use retina_server::config::CommandLine;
+use retina_server::{App, run};
+use serde_json::json;
+use tokio_util::sync::CancellationToken;
+
+/// Most batches, and most poses of one: what the service allows by default.
+const MOST: (usize, usize) = (1000, 1024);
+/// Largest answer that is read, bytes.
+const LARGEST: u64 = 64 << 20;
+
+fn main() {
+    let argument = |index: usize, usual: &str| std::env::args().nth(index).unwrap_or(usual.to_owned());
+    let batches: usize = argument(1, "20").parse::<usize>().expect("BATCHES").clamp(1, MOST.0);
+    let poses: usize = argument(2, "1000").parse::<usize>().expect("POSES").clamp(1, MOST.1);
+    let level = argument(3, "linear");
+    let (sender, receiver) = std::sync::mpsc::channel();
+    std::thread::spawn(move || serve(&sender));
+    let address = receiver.recv().expect("address");
+    let agent = ureq::Agent::new_with_defaults();
+    let pose = |index: usize| {
+        let x = 0.3 * (index as f64 * 0.618).fract() - 0.15;
+        json!({"needle": {"tip_mm": [x, -0.05, 0.0]}, "force_mn": [0.0, 0.0, -0.4]})
+    };
+    let list: Vec<_> = (0..poses).map(pose).collect();
+    let body = json!({"poses": list, "accuracy": {"level": level}}).to_string();
+    let mut rates = Vec::with_capacity(batches);
+    for _ in 0..batches {
+        let started = Instant::now();
+        let post = agent.post(format!("http://{address}/v1/predict/batch")).header("content-type", "application/json");
+        let mut response = post.send(&body).expect("answer");
+        let text = response.body_mut().with_config().limit(LARGEST).read_to_vec().expect("body");
+        let seconds = started.elapsed().as_secs_f64();
+        let answered = text.windows(14).filter(|word| word == b"{\"prediction\":").count();
+        assert_eq!(answered, poses, "{}", String::from_utf8_lossy(&text[..text.len().min(1000)]));
+        rates.push(poses as f64 / seconds);
+    }
+    let at = |share: f64| quantile(&rates, share);
+    println!("{level}, {batches} batches of {poses} poses, one after the other");
+    println!("predictions a second: median {:.0}, p10 {:.0}, p90 {:.0}", at(0.5), at(0.1), at(0.9));
+}
+
+/// The service as the program runs it: one thread that talks, one for each core that computes.
+fn serve(bound: &Sender<SocketAddr>) {
+    let config = CommandLine::parse_from(["retina-server"]).config;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("runtime");
+    runtime.block_on(async {
+        let service = App::start(&config).expect("threads");
+        while service.ready().is_err() {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.expect("port");
+        bound.send(listener.local_addr().expect("address")).expect("main thread");
+        run(listener, service, CancellationToken::new()).await.expect("service");
+    });
+}

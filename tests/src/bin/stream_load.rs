@@ -1,0 +1,142 @@
+//! How long a stream's answers take at a steady rate: `cargo run --release -p retina-tests --bin stream_load [-- RATE SECONDS LEVEL FORMAT]`
+//! (1000 poses a second, 10 seconds, `linear`, `binary`).
+//!
+//! One connection on loopback, the service in this process as the program runs it. One thread of the client sends a pose whenever it is due,
+//! whatever has come back; another reads. The time of an answer is from just before its pose was sent until it was read.
+
+use std::net::{SocketAddr, TcpStream};
+use std::sync::mpsc::Sender;
+use std::time::{Duration, Instant};
+
+use clap::Parser as _;
+use retina_core::comparison::quantile;
+use retina_server::config::CommandLine;
+use retina_server::{App, run};
+use retina_tests::stream_client::{decode, encode_pose};
+use serde_json::{Value, json};
+use tokio_tungstenite::tungstenite::protocol::Role;
+use tokio_tungstenite::tungstenite::{Message, WebSocket, client};
+use tokio_util::sync::CancellationToken;
+
+/// Longest run, so that no argument makes one without end (s).
+const LONGEST_S: f64 = 60.0;
+/// Highest rate (1/s).
+const FASTEST: f64 = 100_000.0;
+/// How long to wait for the last answers.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// The goal at level `linear`: answers a second and the time that 99 of 100 keep (ms).
+const GOAL: (f64, f64) = (1000.0, 2.0);
+
+/// What came back.
+#[derive(Default)]
+struct Seen {
+    milliseconds: Vec<f64>,
+    dropped: u64,
+    problems: u64,
+    last_us: f64,
+}
+
+fn main() {
+    let argument = |index: usize, usual: &str| std::env::args().nth(index).unwrap_or(usual.to_owned());
+    let rate: f64 = argument(1, "1000").parse::<f64>().expect("RATE").clamp(1.0, FASTEST);
+    let seconds: f64 = argument(2, "10").parse::<f64>().expect("SECONDS").clamp(0.1, LONGEST_S);
+    let (level, format) = (argument(3, "linear"), argument(4, "binary"));
+    let (sender, receiver) = std::sync::mpsc::channel();
+    std::thread::spawn(move || serve(&sender));
+    let address = receiver.recv().expect("address");
+
+    let stream = TcpStream::connect(address).expect("connection");
+    stream.set_nodelay(true).expect("nodelay");
+    stream.set_read_timeout(Some(PATIENCE)).expect("timeout");
+    let (mut socket, _) = client(format!("ws://{address}/v1/stream"), stream).expect("handshake");
+    let open = json!({"open": {"accuracy": {"level": level}, "format": format}});
+    socket.send(Message::text(open.to_string())).expect("sent");
+    let opened = socket.read().expect("answer").to_string();
+    assert!(opened.starts_with("{\"opened\""), "{opened}");
+
+    // One side of the socket for each thread: nothing but answers comes before the first ping.
+    let writer = socket.get_ref().try_clone().expect("socket");
+    let writer = WebSocket::from_raw_socket(writer, Role::Client, None);
+    let count = (rate * seconds) as u64;
+    let began = Instant::now();
+    let reading = std::thread::spawn(move || read(socket, began, count));
+    send(writer, began, rate, count);
+    let mut seen = reading.join().expect("reader");
+
+    let answered = seen.milliseconds.len();
+    seen.milliseconds.sort_by(f64::total_cmp);
+    let at = |share: f64| quantile(&seen.milliseconds, share);
+    let per_second = answered as f64 / (seen.last_us * 1e-6);
+    println!("{level}, {format}: {count} poses at {rate} a second on one connection");
+    println!(
+        "answered {answered} ({per_second:.0} a second), dropped {}, problems {}; ms: p50 {:.3}, p99 {:.3}, largest {:.3}",
+        seen.dropped,
+        seen.problems,
+        at(0.5),
+        at(0.99),
+        at(1.0)
+    );
+    let kept = per_second >= 0.99 * GOAL.0 && at(0.99) <= GOAL.1;
+    println!("1000 a second with p99 of 2 ms or less: {}", if kept { "kept" } else { "not kept" });
+}
+
+/// The service as the program runs it: one thread that talks, one for each core that computes.
+fn serve(bound: &Sender<SocketAddr>) {
+    let config = CommandLine::parse_from(["retina-server"]).config;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("runtime");
+    runtime.block_on(async {
+        let service = App::start(&config).expect("threads");
+        while service.ready().is_err() {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.expect("port");
+        bound.send(listener.local_addr().expect("address")).expect("main thread");
+        run(listener, service, CancellationToken::new()).await.expect("service");
+    });
+}
+
+fn send(mut socket: WebSocket<TcpStream>, began: Instant, rate: f64, count: u64) {
+    for index in 0..count {
+        let due = Duration::from_secs_f64(index as f64 / rate);
+        std::thread::sleep(due.saturating_sub(began.elapsed()));
+        // A needle that circles at 1 Hz, so that no answer is the one before.
+        let angle = std::f64::consts::TAU * due.as_secs_f64();
+        let tip_mm = [(0.2 * angle.cos()) as f32, (0.2 * angle.sin()) as f32, 0.0];
+        let now_us = began.elapsed().as_secs_f64() * 1e6;
+        let pose = encode_pose(index + 1, now_us, tip_mm, [0.0, 0.0, 0.0, 1.0], Some([0.0, 0.0, -0.4]));
+        socket.send(Message::binary(pose)).expect("sent");
+    }
+}
+
+/// Reads until the last pose is answered or nothing more comes.
+fn read(mut socket: WebSocket<TcpStream>, began: Instant, count: u64) -> Seen {
+    let mut seen = Seen::default();
+    let mut last = 0;
+    while last < count {
+        let Ok(message) = socket.read() else { break };
+        let now_us = began.elapsed().as_secs_f64() * 1e6;
+        let (sequence, sent_us, dropped) = match message {
+            Message::Binary(bytes) => {
+                let answer = decode(&bytes).expect("an answer of the layout");
+                (answer.sequence, answer.client_time_us, u64::from(answer.dropped))
+            }
+            Message::Text(text) => {
+                let message: Value = serde_json::from_str(&text).expect("JSON");
+                let answer = &message["answer"];
+                match (answer["sequence"].as_u64(), answer["client_time_us"].as_f64(), answer["dropped"].as_u64()) {
+                    (Some(sequence), Some(sent_us), Some(dropped)) => (sequence, sent_us, dropped),
+                    _ => {
+                        seen.problems += 1;
+                        continue;
+                    }
+                }
+            }
+            _ => continue,
+        };
+        last = sequence;
+        seen.dropped += dropped;
+        seen.last_us = now_us;
+        seen.milliseconds.push((now_us - sent_us) * 1e-3);
+    }
+    seen
+}
