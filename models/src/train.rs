@@ -6,6 +6,7 @@
 //! a few fixed layers need no graph of operations, and every derivative is checked against differences by a test.
 
 pub mod adam;
+pub mod card;
 pub mod checkpoint;
 pub mod export;
 pub mod matrix;

@@ -72,3 +72,23 @@ fn the_reference_is_still_the_stored_one() {
         assert!(largest_um > 20.0 * RECOMPUTED_UM, "a node that does not move proves nothing: {largest_um} µm");
     }
 }
+
+/// The stored requests are no part of any training: another program drew them, from another distribution and with sharper edges.
+#[test]
+fn a_learned_level_is_nearer_to_the_reference_than_what_it_corrects() {
+    let (sample, scenes, mut workspace) = (held_out(), scenes(), Workspace::default());
+    let mut mean_um = |level: Level| {
+        let mut errors = Vec::new();
+        for stored in &sample.samples {
+            let (scene, rest) = &scenes[&stored.scene];
+            let answer = scene.predict(&stored.request(level), &mut workspace, &mut Silent).unwrap();
+            errors.extend(stored.errors_um(rest, &answer));
+        }
+        errors.iter().sum::<f64>() / errors.len() as f64
+    };
+    for (learned, start) in [(Level::Network, Level::Linear), (Level::Corrected, Level::Coarse)] {
+        let (learned_um, start_um) = (mean_um(learned), mean_um(start));
+        println!("{}: mean {learned_um:.3} µm, {}: {start_um:.3} µm", learned.name(), start.name());
+        assert!(learned_um < start_um, "{}: mean {learned_um} µm, {}: {start_um} µm", learned.name(), start.name());
+    }
+}

@@ -8,8 +8,13 @@ use clap::{Args, ValueEnum};
 
 use crate::contact::learn::ContactLearner;
 use crate::contact::network::Form;
+use retina_core::network::weights::hash;
+
 use crate::data::Data;
 use crate::faithful::learn::FaithfulLearner;
+use crate::sample::{Sample, Split};
+use crate::shard;
+use crate::train::card::{self, Card, Parity};
 use crate::train::checkpoint::write_whole;
 use crate::train::export::{self, Named};
 use crate::train::record::{self, Record};
@@ -96,13 +101,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     if arguments.network == Which::Faithful {
         let learner = FaithfulLearner::new(&data.samples);
         let state = train(arguments, &learner, &FAITHFUL)?;
-        return finish(arguments, &learner, &data, &state, learner.tensors(&state.best));
+        return finish(arguments, &learner, &data, &state, learner.tensors(&state.best), None);
     }
     let Arguments { width, blocks, messages, .. } = *arguments;
     let form = Form { coarse: arguments.network == Which::Corrected, width, blocks, messages, hidden: HIDDEN };
     let learner = ContactLearner::new(form, &data.samples);
     let state = train(arguments, &learner, &CONTACT)?;
-    finish(arguments, &learner, &data, &state, learner.tensors(&state.best))
+    let checked = |sample: &&Sample| sample.split == Split::Validation && (!form.coarse || sample.coarse.is_some());
+    if let Some(sample) = data.samples.iter().find(checked) {
+        shard::write(&arguments.out.join(format!("{}.parity.safetensors", learner.network())), &[*sample])?;
+    }
+    finish(arguments, &learner, &data, &state, learner.tensors(&state.best), learner.parity(&state.best))
 }
 
 fn train(arguments: &Arguments, learner: &dyn Learner, defaults: &Defaults) -> Result<State, Box<dyn Error>> {
@@ -144,6 +153,7 @@ fn finish(
     data: &Data,
     state: &State,
     tensors: Vec<Named>,
+    parity: Option<Parity>,
 ) -> Result<(), Box<dyn Error>> {
     let settings = serde_json::from_slice(&std::fs::read(arguments.out.join(SETTINGS))?)?;
     let name = learner.network();
@@ -165,6 +175,24 @@ fn finish(
     ];
     let file = export::weights(name, &tensors, &about)?;
     write_whole(&arguments.out.join(format!("{name}.safetensors")), &file)?;
+    let (what, limits) = match parity {
+        Some(_) => (card::CONTACT, card::CONTACT_LIMITS),
+        None => (card::FAITHFUL, card::FAITHFUL_LIMITS),
+    };
+    let card = Card {
+        network: name.to_owned(),
+        what: what.to_owned(),
+        limits: limits.to_owned(),
+        data_sha256: data.sha256.clone(),
+        samples: learner.counts(),
+        seed: record.settings.seed,
+        epochs: [record.settings.epochs, record.best_epoch],
+        parameters: record.parameters,
+        weights_sha256: hash(&file),
+        validation_node_um: state.curve.get(record.best_epoch).map_or(f64::NAN, |epoch| epoch.validation.node_um),
+        parity,
+    };
+    write_whole(&arguments.out.join(format!("{name}.card.json")), serde_json::to_string_pretty(&card)?.as_bytes())?;
     write_whole(&arguments.out.join(format!("{name}.record.json")), serde_json::to_string(&record)?.as_bytes())?;
     let mut told = String::new();
     if let Some(best) = state.curve.get(record.best_epoch) {

@@ -11,6 +11,7 @@ use super::network::{Form, Network, Pass, Slopes};
 use super::prepared::{Normaliser, Prepared};
 use crate::describe;
 use crate::sample::{Sample, Split};
+use crate::train::card::Parity;
 use crate::train::export::Named;
 use crate::train::parameters::Layout;
 use crate::train::run::Learner;
@@ -102,6 +103,21 @@ impl ContactLearner {
             conformal(surprises, level).unwrap_or(largest)
         };
         self.surprises(parameters).into_iter().zip(LEVELS).map(shift).collect()
+    }
+
+    /// What the trainer computes for the first sample of the validation split.
+    pub fn parity(&self, parameters: &[f32]) -> Option<Parity> {
+        let sample = self.validation.first()?;
+        let mut pass = Pass::default();
+        self.network.forward(parameters, &[sample], &mut pass);
+        let sum = |numbers: &[f32]| numbers.iter().map(|&number| f64::from(number)).sum();
+        let shifted = pass.quantile.iter().zip(self.shifts(parameters)).map(|(quantile, shift)| quantile + shift);
+        Some(Parity {
+            features: [sum(&sample.local), sum(&sample.global)],
+            quantiles: shifted.collect(),
+            coefficients: pass.out,
+            motion: pass.motion,
+        })
     }
 
     /// All tensors of the weights.

@@ -18,7 +18,7 @@ pub struct Kelvinlet {
 }
 
 /// Radii tried, in contact radii.
-const RADII: [f32; 8] = [0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0];
+const RADII: [f32; 10] = [0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8];
 /// Samples that it is fitted to: every so many-th.
 const FITTED: usize = 1000;
 
