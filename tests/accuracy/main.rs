@@ -9,6 +9,8 @@ use nalgebra::Point3;
 use retina_core::predict::{Level, PreparedScene, Workspace};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
+use retina_tests::cost::report::Results;
+use retina_tests::cost::small;
 use retina_tests::held_out::{HeldOut, PATH, prepare};
 
 /// Largest node difference of a recomputed reference (µm): the solver's tolerance and another machine's rounding, a tenth of the
@@ -90,5 +92,35 @@ fn a_learned_level_is_nearer_to_the_reference_than_what_it_corrects() {
         let (learned_um, start_um) = (mean_um(learned), mean_um(start));
         println!("{}: mean {learned_um:.3} µm, {}: {start_um:.3} µm", learned.name(), start.name());
         assert!(learned_um < start_um, "{}: mean {learned_um} µm, {}: {start_um} µm", learned.name(), start.name());
+    }
+}
+
+/// The committed run of the `accuracy` program.
+const COSTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/accuracy/results.json");
+/// A ratio of two levels' times may differ from the committed one by this factor: another machine, and other work beside it.
+const RATIO_FACTOR: f64 = 5.0;
+
+#[test]
+fn levels_and_knobs_cost_what_the_committed_run_says() {
+    let committed: Results = serde_json::from_str(&std::fs::read_to_string(COSTS).unwrap()).unwrap();
+    let now = small::standings(1).unwrap();
+    assert_eq!(
+        now.iter().map(|s| &s.name).collect::<Vec<_>>(),
+        committed.small.iter().map(|s| &s.name).collect::<Vec<_>>()
+    );
+    for (now, then) in now.iter().zip(&committed.small) {
+        assert_eq!(now.failed, then.failed, "{}", now.name);
+        for (now_um, then_um) in
+            [(now.mean_um, then.mean_um), (now.median_um, then.median_um), (now.max_um, then.max_um)]
+        {
+            assert!((now_um - then_um).abs() <= RECOMPUTED_UM, "{}: {now_um} µm, committed {then_um} µm", now.name);
+        }
+    }
+    let ms = |standings: &[retina_tests::cost::measure::Standing], name: &str| {
+        standings.iter().find(|s| s.name == name).unwrap().median_ms
+    };
+    for name in ["linear", "network", "corrected"] {
+        let [now, then] = [&now, &committed.small].map(|s| ms(s, name) / ms(s, "coarse"));
+        assert!(now <= RATIO_FACTOR * then, "{name} takes {now} of `coarse`, committed {then}");
     }
 }

@@ -148,6 +148,8 @@ pub fn cause(error: &PredictError) -> (Kind, &'static str) {
         PredictError::BeyondPuncture { .. } => (Refused, "beyond puncture"),
         PredictError::TooDeep { .. } => (Refused, "too deep"),
         PredictError::Effect { .. } => (Refused, "effect"),
+        PredictError::NotLearned { .. } => (Refused, "not learned"),
+        PredictError::Weights { .. } => (Failed, "weights"),
         PredictError::Patch(_) => (Refused, "patch of the mesh"),
         PredictError::Mesh(_) => (Refused, "tissue cannot be meshed"),
         PredictError::Linear(problem) if problem.contains("grows past") => (Refused, "contact too wide"),

@@ -15,6 +15,7 @@ use retina_core::needle::{Needle, NeedleShape, Tip};
 use retina_core::predict::{Control, EffectChoice, Level, PUNCTURE_PRESSURE_PER_MODULUS, Request};
 use retina_core::range::ParameterRange;
 use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
+use retina_core::scene::puncture::Puncture;
 use retina_core::scene::{LEAST_PIT_FLOOR_MM, Scene, SceneSurface};
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
 use retina_core::tissue::ranges::{
@@ -205,6 +206,7 @@ impl SceneNumbers {
             friction_coefficient: self.friction_coefficient,
             pressure_kpa,
             rest_pressure_kpa,
+            puncture: Puncture::default(),
         }
     }
 }
@@ -310,6 +312,7 @@ impl RequestNumbers {
             shape: NeedleShape { radius_mm: self.radius_mm, tip },
             tip_mm: Point3::from(self.tip_mm),
             orientation: Unit::new_normalize(Quaternion::from(Vector4::from(self.orientation_xyzw))),
+            stiffness_mn_per_mm: None,
         };
         let control = self.force_mn.map_or(Control::Pose, |force| Control::Force(Vector3::from(force)));
         let effects = match self.effects.iter().map(String::as_str).collect::<Vec<_>>()[..] {

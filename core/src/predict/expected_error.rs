@@ -49,6 +49,8 @@ pub struct Situation {
     pub strain: f64,
     /// Whether needles, poses and tissues like this one were sampled.
     pub sampled: bool,
+    /// Expected deflection of the tip, where the bending of the shaft is called for (µm).
+    pub deflection_um: f64,
     /// What level `network` expects of its own answer; `None` where it has none.
     pub network: Option<ExpectedError>,
     /// The same of level `corrected`.
@@ -99,6 +101,7 @@ impl Situation {
             depth_um: depth_mm * 1e3,
             strain,
             sampled,
+            deflection_um: 0.0,
             network: None,
             corrected: None,
         }
@@ -126,7 +129,17 @@ impl Situation {
         };
         let quantiles = &table[usize::from(self.edged)][bin(self.strain)];
         let (median_um, p95_um) = (quantiles.median * self.depth_um, quantiles.p95 * self.depth_um);
-        self.with_reference_error(median_um, p95_um, self.sampled && quantiles.p95.is_finite())
+        let calibrated = self.sampled && quantiles.p95.is_finite();
+        match level {
+            Level::Linear => self.with_rigid_needle(median_um, p95_um, calibrated),
+            _ => self.with_reference_error(median_um, p95_um, calibrated),
+        }
+    }
+
+    /// As [`Self::with_reference_error`], of a level that holds the needle rigid: the surface follows a tip that evades, at most as far.
+    pub fn with_rigid_needle(&self, median_um: f64, p95_um: f64, calibrated: bool) -> ExpectedError {
+        let left_out_um = self.deflection_um;
+        self.with_reference_error(median_um + left_out_um, p95_um + left_out_um, calibrated && left_out_um == 0.0)
     }
 
     /// An error against level `reference` as one against the truth: what was compared with has an error itself.

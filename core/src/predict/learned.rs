@@ -14,7 +14,7 @@ use super::finite_element::{COARSE, ContactEstimate, FiniteElementAnswer};
 use super::linear::{LinearAnswer, Load, Press};
 use super::question::{Question, Sink};
 use super::types::{ContactReport, ContactState, Level, PredictError, SolverReport};
-use crate::effects::{adhesion, friction, pressure, tool_flex};
+use crate::effects::{adhesion, friction, pressure};
 use crate::network::contact::{Corrected, Memory};
 use crate::network::graph::Graph;
 use crate::network::input::{Answer, Field, Input, TissueNumbers};
@@ -62,7 +62,6 @@ impl Question<'_> {
         let simulated = [
             (decision.friction, friction::NAME),
             (decision.adhesion, adhesion::NAME),
-            (decision.tool_flex, tool_flex::NAME),
             (sink.change_kpa.is_some(), pressure::NAME),
         ];
         if let Some((_, name)) = simulated.into_iter().find(|(on, _)| *on) {
@@ -107,7 +106,7 @@ impl Question<'_> {
                 let known = network.knows_depth(situation.strain as f32);
                 let ratios = network.prior(situation.edged, situation.strain as f32);
                 let [median_mm, p95_mm] = ratios.map(|ratio| f64::from(ratio) * linear.depth_mm);
-                situation.with_reference_error(
+                situation.with_rigid_needle(
                     median_mm * 1e3,
                     p95_mm * 1e3,
                     known && self.patch().source_indices.is_none(),
@@ -119,7 +118,7 @@ impl Question<'_> {
     fn expected_of(&self, corrected: &Corrected, linear: &LinearAnswer) -> ExpectedError {
         let [median_mm, p95_mm] = corrected.error_mm.map(f64::from);
         let calibrated = corrected.known && self.patch().source_indices.is_none();
-        self.situation_under(linear).with_reference_error(median_mm * 1e3, p95_mm * 1e3, calibrated)
+        self.situation_under(linear).with_rigid_needle(median_mm * 1e3, p95_mm * 1e3, calibrated)
     }
 
     /// The request as a network sees it.

@@ -109,7 +109,10 @@ impl Question<'_> {
         let mut situation = self.situation(linear.depth_mm, linear.depth_mm / self.yielding_mm(), Some(&linear.press));
         // Needles were sampled with rigid shafts.
         let bending = self.bending(Some(linear));
-        situation.sampled &= !tool_flex::report(&self.request.effects, Level::Coarse, true, &bending).simulated;
+        if tool_flex::report(&self.request.effects, Level::Coarse, true, &bending).simulated {
+            situation.sampled = false;
+            situation.deflection_um = bending.deflection_um();
+        }
         situation
     }
 

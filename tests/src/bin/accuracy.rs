@@ -13,7 +13,7 @@ use retina_tests::cost::contestant::contestants;
 use retina_tests::cost::measure::measure;
 use retina_tests::cost::panel::Panel;
 use retina_tests::cost::report::{Circumstances, Results, markdown};
-use retina_tests::cost::{chart, report};
+use retina_tests::cost::{chart, report, small};
 
 /// Requests of each panel unless told.
 const REQUESTS: usize = 30;
@@ -37,7 +37,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         panels.push(measure((panel.name(), panel.caption()), &questions, &contestants, REPEATS, &bar));
     }
     bar.finish();
-    let results = Results { circumstances: circumstances(requests, seed), panels };
+    let small = small::standings(REPEATS)?;
+    let results = Results { circumstances: circumstances(requests, seed), panels, small };
     let folder = Path::new(OUTPUT);
     fs::create_dir_all(folder)?;
     fs::write(folder.join("chart.svg"), chart::svg(&results.panels, "What accuracy costs in time"))?;

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use indicatif::ProgressBar;
 use retina_core::comparison::{node_errors_um, quantile};
-use retina_core::predict::{Level, Prediction, Workspace};
+use retina_core::predict::{Level, Prediction, PreparedScene, Request, Workspace};
 use serde::{Deserialize, Serialize};
 
 use super::contestant::Contestant;
@@ -69,8 +69,9 @@ const SLOW_MS: f64 = 100.0;
 /// Absolute and relative change that refinement of the reference may still bring (µm, share of the largest displacement).
 const REFERENCE_CHANGE: (f64, f64) = (0.5, 0.01);
 
+/// Errors and times of one contestant as they come.
 #[derive(Default)]
-struct Tally {
+pub(super) struct Tally {
     errors_um: Vec<f64>,
     worst_um: Vec<f64>,
     ms: Vec<f64>,
@@ -79,7 +80,7 @@ struct Tally {
 }
 
 impl Tally {
-    fn standing(&self, contestant: &Contestant, motion_um2: f64) -> Standing {
+    pub(super) fn standing(&self, contestant: &Contestant, motion_um2: f64) -> Standing {
         let squares: f64 = self.errors_um.iter().map(|e| e * e).sum();
         Standing {
             name: contestant.name.clone(),
@@ -128,7 +129,8 @@ pub fn measure(
         motions.push(largest_um);
         floors.push(floor_um);
         for (contestant, tally) in contestants.iter().zip(&mut tallies) {
-            tally.add(contestant, question, &truth, repeats, &mut workspace);
+            let errors = |answer: &Prediction| node_errors_um(&answer.vertices, &truth.vertices);
+            tally.add(contestant, (&question.scene, &question.request), errors, repeats, &mut workspace);
         }
     }
     truths.worst_um.clone_from(&floors);
@@ -148,17 +150,18 @@ pub fn measure(
 }
 
 impl Tally {
-    fn add(
+    /// Answers a request once to warm up and `repeats` times more against the clock; `errors_um` are the node errors of its answer.
+    pub(super) fn add(
         &mut self,
         contestant: &Contestant,
-        question: &Question,
-        truth: &Prediction,
+        (scene, request): (&PreparedScene, &Request),
+        errors_um: impl Fn(&Prediction) -> Vec<f64>,
         repeats: usize,
         workspace: &mut Workspace,
     ) {
         let mut timed = || {
             let begun = Instant::now();
-            let answer = contestant.answer(&question.scene, &question.request, workspace);
+            let answer = contestant.answer(scene, request, workspace);
             (begun.elapsed().as_secs_f64() * 1e3, answer)
         };
         let (first_ms, answer) = timed();
@@ -170,7 +173,7 @@ impl Tally {
             true => quantile(&(0..repeats).map(|_| timed().0).collect::<Vec<_>>(), 0.5),
             false => first_ms,
         };
-        let errors = node_errors_um(&answer.vertices, &truth.vertices);
+        let errors = errors_um(&answer);
         self.worst_um.push(errors.iter().copied().fold(0.0, f64::max));
         self.errors_um.extend(errors);
         self.ms.push(ms);

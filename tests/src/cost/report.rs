@@ -33,6 +33,8 @@ pub struct Results {
     pub circumstances: Circumstances,
     /// What came out.
     pub panels: Vec<Measured>,
+    /// The small run on the held-out sample, which the accuracy tier repeats.
+    pub small: Vec<Standing>,
 }
 
 /// The report as Markdown, the chart being the file `chart` beside it.

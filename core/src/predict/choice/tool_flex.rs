@@ -34,6 +34,8 @@ pub fn report(choice: &EffectChoice, level: Level, contact: bool, bending: &Bend
         Some("contact is not simulated")
     } else if level == Level::Linear {
         Some("level `linear` has a rigid needle by construction")
+    } else if level.is_learned() {
+        Some("the level learned with rigid needles")
     } else if bending.cosine < LEAST_COSINE {
         Some(
             "the needle moves across its shaft by more than 60 degrees, which the model of a pushed shaft does not hold for",
