@@ -93,7 +93,8 @@ impl StandIn {
         let linear = prepared.predict(&at(Level::Linear), workspace, &mut Silent)?;
         let coarse = prepared.predict(&at(Level::Coarse), workspace, &mut Silent)?;
         let body = request.needle.shape.body();
-        let tool = Tool { body: &body, patch_from_needle: request.needle.scene_from_needle() };
+        let tool =
+            Tool { body: &body, patch_from_needle: request.needle.scene_from_needle(), stiffness_mn_per_mm: None };
         let direction = Unit::new_normalize(force);
         let motion = Motion { direction, force_mn: Some(force.norm()), travel_mm: 0.0 };
         let pressing = press(patch, &tool, &motion)?;
