@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use retina_core::needle::{NeedleShape, Tip};
 use retina_core::predict::networks::Networks;
 use retina_core::predict::{Control, EffectChoice, Level, PredictError, PreparedScene, Request};
 use retina_core::scene::Scene;
@@ -184,11 +183,11 @@ fn without_usable_weights_the_other_levels_answer() {
 }
 
 #[test]
-fn an_extreme_needle_is_answered_and_flagged() {
-    let scene = built_in("macula");
-    let mut request = requests(&scene, 195, 1)[0].clone();
-    request.needle.shape = NeedleShape { radius_mm: 0.5, tip: Tip::Hemispherical };
-    request.control = Control::Force(request.needle.direction().into_inner() * 2.0);
-    let answer = ask(&scene, &at(&request, Level::Network)).unwrap();
-    assert!(!answer.expected_error.calibrated);
+fn a_tissue_beyond_the_training_is_answered_and_flagged() {
+    let known = ask(&built_in("macula"), &straight(Level::Network, 0.5)).unwrap();
+    assert!(known.expected_error.calibrated);
+    let mut hard = Scene::built_in("macula").unwrap();
+    hard.tissue.choroid.youngs_modulus_kpa = 1250.0;
+    let answer = ask(&PreparedScene::new(hard).unwrap(), &straight(Level::Network, 0.5)).unwrap();
+    assert!(!answer.expected_error.calibrated && answer.expected_error.p95_um.is_finite());
 }

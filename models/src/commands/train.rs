@@ -58,17 +58,17 @@ pub struct Arguments {
     /// Largest step of Adam: 2e-3, or the paper's 4e-4.
     #[arg(long)]
     rate: Option<f32>,
-    /// Weight decay per unit of step: 1e-2, or the paper's none.
+    /// Weight decay per unit of step: 0.5, or the paper's none.
     #[arg(long)]
     decay: Option<f32>,
     /// Epochs without a better validation after which it ends.
     #[arg(long, default_value_t = 100)]
     patience: usize,
     /// Width of the trunk.
-    #[arg(long, default_value_t = 96)]
+    #[arg(long, default_value_t = 128)]
     width: usize,
     /// Blocks of the trunk.
-    #[arg(long, default_value_t = 3)]
+    #[arg(long, default_value_t = 4)]
     blocks: usize,
     /// How many of them hear their neighbours.
     #[arg(long, default_value_t = 0)]
@@ -86,7 +86,7 @@ struct Defaults {
     decay: f32,
 }
 /// The contact networks.
-const CONTACT: Defaults = Defaults { batch: 64, chunk: 16, rate: 2e-3, decay: 1e-2 };
+const CONTACT: Defaults = Defaults { batch: 64, chunk: 16, rate: 2e-3, decay: 0.5 };
 /// The paper's: its public configuration.
 const FAITHFUL: Defaults = Defaults { batch: 4, chunk: 1, rate: 4e-4, decay: 0.0 };
 /// File of the settings that a run began with.
