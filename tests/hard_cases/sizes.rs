@@ -28,7 +28,7 @@ fn pressed(topology: &WallTopology, s: f64, solid: Solid) -> ([f64; 3], usize) {
     tissue.choroid.thickness_mm *= s;
     tissue.sclera.thickness_mm *= s;
     let body = NeedleShape::hemispherical(0.257 * s).body();
-    let tool = Tool { body: &body, patch_from_needle: Isometry3::identity() };
+    let tool = Tool { body: &body, patch_from_needle: Isometry3::identity(), stiffness_mn_per_mm: None };
     let radii = (0..=COARSE.rings).map(|ring| s * 0.15 * 10.0_f64.powf(ring as f64 / COARSE.rings as f64)).collect();
     let mesh = MeshSize { disc: DiscGeometry { center: [0.0; 2], radii }, first_element_mm: 0.3 * s };
     let contact = ContactSettings {

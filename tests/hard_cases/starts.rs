@@ -38,7 +38,7 @@ impl Bench {
         let disc = DiscGeometry { center: [0.0; 2], radii };
         let mesh = MeshSize { disc, first_element_mm: 0.3 };
         let patch_from_needle = Isometry3::from_parts(Translation3::new(0.0, 0.0, height_mm), nalgebra::one());
-        let tool = Tool { body: &self.body, patch_from_needle };
+        let tool = Tool { body: &self.body, patch_from_needle, stiffness_mn_per_mm: None };
         Wall::new(&self.topology, &Surface::Flat, &self.tissue, &mesh, solid, COARSE.contact, tool).unwrap()
     }
 }

@@ -10,7 +10,7 @@ use retina_core::tissue::Layer;
 use retina_tests::tolerance::{BALANCE, RIGID_MOTION};
 
 use crate::support::{
-    answered, ask, at, built_in, cap, force, largest_um, mesh_scene, motion, moved, requests, straight,
+    answered, ask, at, built_in, cap, force, largest_um, mesh_scene, motion, moved, straight,
 };
 
 const LEARNED: [Level; 2] = [Level::Network, Level::Corrected];
