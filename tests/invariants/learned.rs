@@ -9,9 +9,7 @@ use retina_core::scene::Scene;
 use retina_core::tissue::Layer;
 use retina_tests::tolerance::{BALANCE, RIGID_MOTION};
 
-use crate::support::{
-    answered, ask, at, built_in, cap, force, largest_um, mesh_scene, motion, moved, straight,
-};
+use crate::support::{answered, ask, at, built_in, cap, force, largest_um, mesh_scene, motion, moved, straight};
 
 const LEARNED: [Level; 2] = [Level::Network, Level::Corrected];
 /// Single precision has a rounding of 6e-8 of a coordinate of 1 mm, where double precision has a residual: 0.01 µm in all.
