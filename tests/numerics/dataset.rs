@@ -5,12 +5,20 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use indicatif::ProgressBar;
+use nalgebra::Point3;
+use retina_core::approach::first_touch;
+use retina_core::needle::Tip;
 use retina_core::predict::finite_element::COARSE;
+use retina_core::predict::indentation::{EFFECTS, Indentation, Memory};
+use retina_core::predict::{Control, EffectChoice, Level, PreparedScene, Request, Workspace};
+use retina_core::progress::Silent;
 use retina_models::dataset::DatasetError;
 use retina_models::dataset::deformcontact::{ContactSample, export, import};
-use retina_models::dataset::draw::{INNER, STEPS, TILT_DEG, plan};
+use retina_models::dataset::draw::{INNER, PathPlan, STEPS, TILT_DEG, plan};
 use retina_models::dataset::manifest::Manifest;
+use retina_models::dataset::path::before_limit_point;
 use retina_models::dataset::run::{BLOCKS, Order, Summary, generate};
+use retina_models::dataset::truth::TRUTH;
 use retina_models::sample::{Sample, Split};
 use retina_models::shard::{self, ShardError};
 use retina_tests::tolerance::DISCRETISATION;
@@ -118,12 +126,6 @@ fn samples_obey_the_laws_of_their_equilibrium() {
         assert!(dot(&sample.direction, &sample.inward) > 0.25);
         let numbers = sample.truth.displacement_mm.as_flattened();
         assert!(numbers.iter().all(|number| number.is_finite()) && numbers.iter().any(|number| number.abs() > 1e-4));
-        // Force control finds the travel that pose control was given; the two lay their meshes around contacts that differ a little.
-        if let Some(coarse) = &sample.coarse {
-            let beyond = sample.truth.travel_mm - sample.touch_travel_mm;
-            let off = f64::from((coarse.travel_mm - sample.truth.travel_mm).abs() / beyond);
-            assert!(off < DISCRETISATION, "path {} step {}: {off}", sample.path, sample.step);
-        }
     }
     for path in samples.chunk_by(|a, b| a.path == b.path) {
         for pair in path.windows(2) {
@@ -131,6 +133,50 @@ fn samples_obey_the_laws_of_their_equilibrium() {
             assert!(pair[1].force_mn > pair[0].force_mn, "path {}: deeper takes more force", pair[0].path);
         }
     }
+}
+
+#[test]
+fn pushed_with_the_force_of_a_step_the_needle_stops_at_its_travel() {
+    let plan = (0..).find_map(|path| plan(5, path, &[1]).filter(|plan| plan.needle.shape.tip == Tip::Hemispherical));
+    let plan = plan.unwrap();
+    let scene = PreparedScene::new(plan.scene.clone()).unwrap();
+    let mut held = Indentation::new(&scene, plan.needle, plan.direction, TRUTH).unwrap();
+    let touch_mm = touch_travel_mm(&plan);
+    let mut memory = Memory::default();
+    let step = held.advance(touch_mm + 0.1, &mut memory, &mut Silent).unwrap().unwrap();
+    let force_mn = -step.reaction_mn.dot(&plan.direction);
+    let pushed = |share: f64| {
+        let request = Request {
+            needle: plan.needle,
+            control: Control::Force(plan.direction.into_inner() * (share * force_mn)),
+            level: Level::Reference,
+            effects: EffectChoice::Named(EFFECTS.map(str::to_owned).to_vec()),
+        };
+        let answer = scene.predict_at(&request, &TRUTH, &mut Workspace::default(), &mut Silent).unwrap();
+        (answer.needle.travel_mm - touch_mm) / 0.1 - 1.0
+    };
+    // The two lay their meshes around contacts that `coarse` finds at its own travel and at its own force.
+    let off = pushed(1.0);
+    assert!(off.abs() < 0.1 * DISCRETISATION, "{off}");
+    assert!(pushed(1.3) > off + DISCRETISATION, "more force goes deeper");
+}
+
+fn touch_travel_mm(plan: &PathPlan) -> f64 {
+    let patch = plan.scene.patch(&Point3::origin()).unwrap();
+    let pose = plan.needle.scene_from_needle();
+    first_touch(&patch.surface, &plan.needle.shape.body(), &pose, &plan.direction).unwrap().travel_mm
+}
+
+#[test]
+fn a_path_ends_where_it_takes_no_more_force() {
+    let place = folder("limit-point");
+    run(&order(8, 2), &place);
+    let mut path: Vec<Sample> = samples(&place).into_iter().filter(|sample| sample.path == 0).collect();
+    assert_eq!(before_limit_point(&path), path.len());
+    assert!(path.len() > 3);
+    path[3].force_mn = path[2].force_mn;
+    assert_eq!(before_limit_point(&path), 3);
+    assert_eq!(before_limit_point(&[]), 0);
 }
 
 #[test]

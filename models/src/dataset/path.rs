@@ -41,19 +41,22 @@ pub enum Cause {
     Mesh,
     /// The needle does not press, or the tissue pulls: no such sample can be asked for.
     NoForce,
+    /// It takes no more force than the step before: past a limit point, where a pushed needle would not stop at this travel.
+    LimitPoint,
     /// Any other refusal of a level.
     Refused,
 }
 
 impl Cause {
     /// Every cause.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::NoStart,
         Self::BeyondPuncture,
         Self::TooDeep,
         Self::NotConverged,
         Self::Mesh,
         Self::NoForce,
+        Self::LimitPoint,
         Self::Refused,
     ];
 
@@ -66,6 +69,7 @@ impl Cause {
             Self::NotConverged => "not_converged",
             Self::Mesh => "mesh",
             Self::NoForce => "no_force",
+            Self::LimitPoint => "limit_point",
             Self::Refused => "refused",
         }
     }
@@ -89,6 +93,13 @@ pub struct PathOutcome {
     pub ended_by: Option<Cause>,
     /// Newton iterations on the fine mesh, all steps together.
     pub iterations: usize,
+}
+
+/// How many of a path's first samples take ever more force. What comes after is an equilibrium of the needle held there, and none of the needle
+/// pushed with that force.
+pub fn before_limit_point(samples: &[Sample]) -> usize {
+    let falls = samples.windows(2).position(|pair| pair[1].force_mn <= pair[0].force_mn);
+    falls.map_or(samples.len(), |at| at + 1)
 }
 
 /// A thread's memory.

@@ -15,8 +15,8 @@ use retina_core::scene::Scene;
 use super::blocks::{BlockRecord, Blocks, PATHS_PER_BLOCK};
 use super::draw::plan;
 use super::error::DatasetError;
-use super::manifest::{Counts, Manifest, Settings};
-use super::path::{Cause, Path, PathMemory, PathOutcome};
+use super::manifest::{Counts, FILE, Manifest, Settings};
+use super::path::{Cause, Path, PathMemory, PathOutcome, before_limit_point};
 use super::shards::Shards;
 use super::truth;
 
@@ -84,7 +84,10 @@ pub fn generate(order: &Order, folder: &FilePath, progress: &ProgressBar) -> Res
     std::fs::create_dir_all(folder).map_err(DatasetError::io(folder))?;
     let settings = Settings::new(order.seed, &scenes);
     settings.check(folder)?;
-    Manifest::new(settings.clone(), Counts { paths: order.paths, ..Counts::default() }, Vec::new()).write(folder)?;
+    if !folder.join(FILE).exists() {
+        let counts = Counts { paths: order.paths, ..Counts::default() };
+        Manifest::new(settings.clone(), counts, Vec::new()).write(folder)?;
+    }
     let blocks = Blocks::open(&folder.join(BLOCKS))?;
     let mut finished = Vec::new();
     for block in 0..order.paths.div_ceil(PATHS_PER_BLOCK) {
@@ -108,6 +111,8 @@ pub fn generate(order: &Order, folder: &FilePath, progress: &ProgressBar) -> Res
         }
         drop(done);
         let gathered = (0..finished.len() as u32).try_for_each(|block| {
+            // What was finished before this run is in the shards already: those on disk are not made shorter for a while.
+            let fresh = finished[block as usize].is_none();
             while finished[block as usize].is_none() {
                 // A thread that is gone without its block has sent its error before.
                 let Ok(message) = news.recv() else { return Err(DatasetError::malformed(folder, "a thread ended")) };
@@ -120,7 +125,7 @@ pub fn generate(order: &Order, folder: &FilePath, progress: &ProgressBar) -> Res
             collected.add(&blocks, block, record)?;
             progress.set_position(u64::from(collected.counts.finished));
             progress.set_message(format!("{} samples", collected.counts.all_samples()));
-            if block % BLOCKS_PER_FLUSH == 0 { collected.flush() } else { Ok(()) }
+            if fresh && block % BLOCKS_PER_FLUSH == 0 { collected.flush() } else { Ok(()) }
         });
         work.stop.store(true, Ordering::Relaxed);
         gathered
@@ -214,14 +219,22 @@ struct Collected<'a> {
 }
 
 impl Collected<'_> {
+    /// Adds a finished block. What follows from its samples alone is decided here and not where they were computed, so that blocks outlast it: where a path
+    /// passes a limit point, and the estimated error of the truth.
     fn add(&mut self, blocks: &Blocks, block: u32, record: &BlockRecord) -> Result<(), DatasetError> {
-        let mut samples = blocks.samples(block, record)?;
-        // Put in here and not where the path was computed: a better estimate needs no new truth.
-        samples.iter_mut().for_each(|sample| sample.truth_error_mm = truth::error_mm(sample));
-        self.shards.add(&samples)?;
+        let samples = blocks.samples(block, record)?;
         for path in &record.paths {
-            let split = samples.iter().find(|sample| sample.path == path.path).map(|sample| sample.split);
-            self.counts.add(path, split);
+            let mut of: Vec<_> = samples.iter().filter(|sample| sample.path == path.path).copied().collect();
+            let mut path = path.clone();
+            let usable = before_limit_point(&of);
+            if usable < of.len() {
+                of.truncate(usable);
+                path.samples = usable;
+                path.ended_by = Some(Cause::LimitPoint.name().to_owned());
+            }
+            of.iter_mut().for_each(|sample| sample.truth_error_mm = truth::error_mm(sample));
+            self.shards.add(&of)?;
+            self.counts.add(&path, of.first().map(|sample| sample.split));
         }
         Ok(())
     }
