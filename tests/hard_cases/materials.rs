@@ -76,7 +76,7 @@ const CASES: &[Case] = &[
         "membrane 1 µm, 1000 times, light touch",
         || tissue(|t| membrane(t, 0.001, 20_000.0)),
         || push(BALL, 0.02),
-        Answer(13),
+        Answer(16),
     ),
     case("membrane 70 nm, 10 times", || tissue(|t| membrane(t, 7e-5, 200.0)), || push(BALL, 0.5), Answer(8)),
     case("membrane 4 µm, 1000 times", || tissue(|t| membrane(t, 0.004, 20_000.0)), || push(BALL, 0.5), Answer(10)),

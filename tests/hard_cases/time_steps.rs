@@ -56,7 +56,9 @@ fn run(name: &str, steps: &[Step]) -> Vec<(f64, usize)> {
     for step in steps {
         let outcome = simulation.step(&mut Silent).unwrap_or_else(|error| panic!("{name}: {error}")).unwrap();
         let needle = Needle { tip_mm: step.tip_mm.unwrap_or(tip_mm), ..needle() };
-        let control = step.force_mn.map_or(Control::Pose, Control::Force);
+        // A needle without a force is drawn back and held there: the forces at play are those of a held one.
+        let pushes = step.force_mn.filter(|force| force.norm() > 0.0);
+        let control = pushes.map_or(Control::Pose, Control::Force);
         let asked = Request { needle, control, level: Level::Coarse, effects: sequence.effects.clone() };
         let answer = outcome.prediction;
         let laws = broken(scene.scene(), &asked, &answer);
