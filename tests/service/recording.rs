@@ -188,6 +188,6 @@ fn a_review_has_one_destination() {
     assert!(parse(&[]).is_err(), "nowhere");
     assert!(parse(&["--save", "a.rrd", "--connect", "rerun+http://127.0.0.1:9876/proxy"]).is_err(), "two places");
     let error = parse(&["--save", "a.rrd", "--level", "reference"]).expect_err("nothing to compare").to_string();
-    assert!(error.contains("linear, coarse"), "{error}");
+    assert!(error.contains("linear, network, coarse, corrected"), "{error}");
     assert!(CommandLine::try_parse_from(["retina-server", "--record", "a.rrd", "--record-connect", "x"]).is_err());
 }
