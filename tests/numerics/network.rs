@@ -184,7 +184,7 @@ fn the_fast_path_agrees_with_plain_loops() {
     let graph = Graph::new(&patch().triangles);
     for (network, file, name) in networks().iter().zip([CONTACT, CORRECTED]).map(|(n, f)| (n, f, n.start().network())) {
         let weights = Weights::read(name, file).unwrap();
-        let take = |name: &str| weights.take(name, &weights.shape(name).unwrap().to_vec()).unwrap();
+        let take = |name: &str| weights.take(name, weights.shape(name).unwrap()).unwrap();
         let input = input(6);
         let mut memory = Memory::default();
         network.predict(&input, &graph, &mut memory).unwrap();

@@ -6,7 +6,7 @@ use crate::sample::{Field, NODES, Sample, Split};
 
 /// Length of the longest vector of a field (µm).
 pub fn largest_um(field: &Field) -> f64 {
-    field.iter().map(|node| length_um(node)).fold(0.0, f64::max)
+    field.iter().map(length_um).fold(0.0, f64::max)
 }
 
 fn length_um(vector: &[f32; 3]) -> f64 {

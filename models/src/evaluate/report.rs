@@ -97,10 +97,13 @@ pub fn report(data: &Data, networks: Vec<Contact>, paper: Option<Faithful>) -> S
     text
 }
 
+/// Which samples a row of the table counts.
+type Wanted = Box<dyn Fn(&Sample) -> bool>;
+
 fn groups(predictors: &mut [Box<dyn Predictor>], samples: &[(&Sample, Input)], mesh: &Mesh) -> String {
     let names: Vec<String> = predictors.iter().map(|p| p.name()).collect();
     let scenes = Scene::built_in_names().iter().enumerate();
-    let mut wanted: Vec<(String, Box<dyn Fn(&Sample) -> bool>)> = Vec::new();
+    let mut wanted: Vec<(String, Wanted)> = Vec::new();
     for (at, scene) in scenes {
         wanted.push(((*scene).to_owned(), Box::new(move |sample| usize::from(sample.scene) == at)));
     }

@@ -1,7 +1,7 @@
 //! Adam with decoupled weight decay, and the schedule of its step.
 //!
 //! `m ← β₁m + (1−β₁)g`, `v ← β₂v + (1−β₂)g²`, `θ ← θ − η (m̂/(√v̂ + ε) + λθ)` with the bias-corrected `m̂`, `v̂` (Kingma & Ba 2015; Loshchilov & Hutter
-//! 2019). The gradient is scaled down to [`LARGEST_NORM`] first.
+//! 2019). The gradient is scaled down to `LARGEST_NORM` first.
 
 /// Decay of the first moment.
 const BETA_1: f32 = 0.9;
@@ -58,7 +58,7 @@ impl Adam {
     }
 }
 
-/// The step's size: a linear rise over the first [`WARM_UP`] of the run, then half a cosine down to zero.
+/// The step's size: a linear rise over the first `WARM_UP` of the run, then half a cosine down to zero.
 pub fn rate(largest: f32, progress: f32) -> f32 {
     if progress < WARM_UP {
         return largest * progress / WARM_UP;

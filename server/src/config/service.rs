@@ -64,7 +64,7 @@ pub struct Config {
     /// what stands on a command line, so a file or the environment is the better place.
     #[arg(long = "token", env = "RETINA_TOKENS", hide_env_values = true, value_name = "TOKEN", value_delimiter = ',', value_parser = token)]
     pub tokens: Vec<String>,
-    /// Origin of web pages that may ask beside the service's own, as https://simulator.example; several with commas between them.
+    /// Origin of web pages that may ask beside the service's own, as `https://simulator.example`; several with commas between them.
     #[arg(long = "cors-origin", env = "RETINA_CORS_ORIGINS", value_name = "ORIGIN", value_delimiter = ',', value_parser = origin)]
     pub cors_origins: Vec<HeaderValue>,
     /// Form of the log on standard error. RUST_LOG says what is logged; `retina_server=debug` has a line for each request.
