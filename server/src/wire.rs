@@ -15,6 +15,7 @@ pub mod request;
 pub mod response;
 pub mod scene;
 pub mod sequence;
+pub mod stored;
 pub mod stream;
 
 pub use batch::{BatchRequest, BatchResponse};
@@ -24,3 +25,4 @@ pub use request::PredictRequest;
 pub use response::PredictResponse;
 pub use scene::SceneSpec;
 pub use sequence::{SimulateLine, SimulateRequest};
+pub use stored::{SceneForm, StoredScene};

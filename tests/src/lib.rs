@@ -9,6 +9,7 @@ pub mod malformed;
 pub mod overload;
 pub mod random_scene;
 pub mod search;
+pub mod spawned;
 pub mod stated_errors;
 pub mod stream_client;
 pub mod tolerance;
