@@ -28,6 +28,7 @@ use crate::understand::{DEFAULT_GAUGE, DEFAULT_SCENE, FORCE, MAX_ERROR, MAX_TIME
 use crate::wire::catalog::{
     About, AboutLimits, GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
 };
+use crate::wire::cost::CostTable;
 use crate::wire::scene::{
     BondSpec, LayerSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec,
     TissueSpec,
@@ -65,6 +66,14 @@ pub fn levels() -> LevelList {
         LevelEntry { name: level.name(), what, cost }
     };
     LevelList { default: DEFAULT_LEVEL.name(), levels: Level::ALL.map(entry).into() }
+}
+
+/// What accuracy costs in time, as the program `accuracy` measured it.
+///
+/// # Errors
+/// When the committed measurement does not have the form that this version knows.
+pub fn accuracy() -> Result<CostTable, serde_json::Error> {
+    serde_json::from_str(include_str!("../../docs/accuracy/results.json"))
 }
 
 /// The gauges, thin to thick.

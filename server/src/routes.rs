@@ -46,6 +46,7 @@ pub fn app(state: AppState) -> Router {
         .routes(routes!(handlers::stream))
         .routes(routes!(handlers::scenes))
         .routes(routes!(handlers::levels))
+        .routes(routes!(handlers::accuracy))
         .routes(routes!(handlers::gauges))
         .routes(routes!(handlers::about))
         .routes(routes!(handlers::metrics))

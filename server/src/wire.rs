@@ -7,6 +7,7 @@
 
 pub mod batch;
 pub mod catalog;
+pub mod cost;
 mod either;
 pub mod fixed;
 pub mod object;
@@ -19,6 +20,7 @@ pub mod stream;
 
 pub use batch::{BatchRequest, BatchResponse};
 pub use catalog::{About, GaugeList, LevelList, Readiness, SceneList};
+pub use cost::CostTable;
 pub use fixed::{Quaternion, Triangle, Vector};
 pub use request::PredictRequest;
 pub use response::PredictResponse;

@@ -7,13 +7,14 @@ use serde_json::Value;
 use crate::harness::{get, post, predict, request, send};
 use crate::schema::{assert_matches, check, description};
 
-const ROUTES: [(&str, &str); 12] = [
+const ROUTES: [(&str, &str); 13] = [
     ("post", "/v1/predict"),
     ("post", "/v1/predict/batch"),
     ("post", "/v1/simulate"),
     ("get", "/v1/stream"),
     ("get", "/v1/scenes"),
     ("get", "/v1/levels"),
+    ("get", "/v1/accuracy"),
     ("get", "/v1/gauges"),
     ("get", "/v1/about"),
     ("get", "/metrics"),
@@ -43,6 +44,7 @@ fn every_answer_matches_its_schema() {
     for (path, schema) in [
         ("/v1/scenes", "SceneList"),
         ("/v1/levels", "LevelList"),
+        ("/v1/accuracy", "CostTable"),
         ("/v1/gauges", "GaugeList"),
         ("/healthz", "Readiness"),
         ("/nowhere", "ProblemDocument"),
