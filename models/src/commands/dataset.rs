@@ -8,6 +8,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 
 use crate::dataset::DatasetError;
+use crate::dataset::draw::Depths;
 use crate::dataset::manifest::Manifest;
 use crate::dataset::report::report;
 use crate::dataset::run::{Order, Summary, generate};
@@ -23,6 +24,9 @@ pub struct Arguments {
     /// Number of paths, of up to six samples each.
     #[arg(long)]
     paths: u32,
+    /// How deep they go.
+    #[arg(long, value_enum, default_value_t = Depths::Deep)]
+    depths: Depths,
     /// Seed: the same seed gives the same data, whatever the number of threads.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -47,7 +51,8 @@ pub struct ReportArguments {
 /// [`DatasetError`].
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let order = Order::new(&arguments.scene, arguments.paths, arguments.seed, threads);
+    let order =
+        Order { depths: arguments.depths, ..Order::new(&arguments.scene, arguments.paths, arguments.seed, threads) };
     let start = Instant::now();
     let Summary { counts, computed, new_samples } = generate(&order, &arguments.out, &ProgressBar::new(0))?;
     let minutes = start.elapsed().as_secs_f64() / 60.0;
