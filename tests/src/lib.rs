@@ -4,6 +4,7 @@ pub mod audit;
 pub mod cap;
 pub mod cost;
 pub mod held_out;
+pub mod held_out_samples;
 pub mod laws;
 pub mod local_service;
 pub mod malformed;

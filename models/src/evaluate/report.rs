@@ -21,7 +21,7 @@ use crate::sample::{Sample, Split};
 /// Gauges between whose radii the rows by needle lie (mm), with their names.
 const NEEDLES: [(&str, f32); 3] = [("41G to 30G", 0.1555), ("30G to 25G", 0.257), ("25G to 23G", 1.0)];
 /// Names of the tips.
-const TIPS: [&str; 3] = ["half balls", "flat tips", "bevels"];
+pub const TIPS: [&str; 3] = ["half balls", "flat tips", "bevels"];
 /// Batch of the published evaluation.
 const PUBLISHED_BATCH: usize = 4;
 
