@@ -34,9 +34,13 @@ impl Access {
         let given =
             given.and_then(|value| value.split_once(' ')).filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"));
         let given = given.map_or("", |(_, token)| token.trim());
+        self.tokens.is_empty() || self.knows(given)
+    }
+
+    /// Whether this is one of the tokens.
+    pub fn knows(&self, given: &str) -> bool {
         let same = |token: &String| token.as_bytes().ct_eq(given.as_bytes());
-        let any = self.tokens.iter().map(same).fold(Choice::from(0), |any, same| any | same);
-        self.tokens.is_empty() || any.into()
+        self.tokens.iter().map(same).fold(Choice::from(0), |any, same| any | same).into()
     }
 
     /// Whether a stream may be opened from where the browser says that its page is; programs say nothing.

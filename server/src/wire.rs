@@ -9,6 +9,7 @@ pub mod batch;
 pub mod catalog;
 mod either;
 pub mod fixed;
+pub mod igtl;
 pub mod object;
 pub mod pose;
 pub mod request;
