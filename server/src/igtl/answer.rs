@@ -52,7 +52,8 @@ impl Form for Answers {
     fn answer(&self, head: &Head, tag: &Tag, prediction: &Prediction) -> Result<Bytes, Problem> {
         let turn = |vector: [f64; 3]| self.axes.turn(vector);
         let vertices: Vec<[f64; 3]> = prediction.vertices.iter().map(|vertex| turn(vertex.coords.into())).collect();
-        let normals: Vec<[f64; 3]> = prediction.normals.iter().map(|normal: &Vector3<f64>| turn((*normal).into())).collect();
+        let normals: Vec<[f64; 3]> =
+            prediction.normals.iter().map(|normal: &Vector3<f64>| turn((*normal).into())).collect();
         let needle = &prediction.needle;
         let (tip_mm, reaction_mn) = (turn(needle.tip_mm.coords.into()), turn(needle.reaction_mn.into()));
         let displacement = ("Displacement_um", prediction.displacement_um.as_slice());

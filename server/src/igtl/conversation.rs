@@ -96,7 +96,13 @@ impl Conversation {
         let needle = self.needle.get_or_insert_with(|| frame.device.clone());
         if *needle != frame.device {
             let detail = format!("the needle of this session is {needle:?}, and this TRANSFORM is {:?}", frame.device);
-            return Err(Problem::field(Kind::UnknownName, "device", Some(json!(frame.device)), needle.as_str(), detail));
+            return Err(Problem::field(
+                Kind::UnknownName,
+                "device",
+                Some(json!(frame.device)),
+                needle.as_str(),
+                detail,
+            ));
         }
         let transform = content::transform(&frame.content)?;
         let orientation = quaternion(self.axes.turn_columns(transform.columns)).ok_or_else(|| {
@@ -199,7 +205,9 @@ impl Protocol for Conversation {
     fn farewell(&self, why: Farewell<Broken>) -> Option<Bytes> {
         let (code, text) = match why {
             Farewell::Stopping => (EXITING, "The service stops.".to_owned()),
-            Farewell::Silent => (TIMED_OUT, "Nothing came for the idle time; GET_STATUS shows that a client is there.".to_owned()),
+            Farewell::Silent => {
+                (TIMED_OUT, "Nothing came for the idle time; GET_STATUS shows that a client is there.".to_owned())
+            }
             Farewell::Broken(Broken::Io(_)) => return None,
             Farewell::Broken(error) => (UNKNOWN_VERSION, format!("What comes cannot be told apart: {error}.")),
         };

@@ -57,9 +57,7 @@ impl Protocol for WebSockets {
             Message::Text(text) if text.len() > SHORT => {
                 return Taken::Open(Box::new(move || match read(text.as_bytes())? {
                     StreamCommand { open: Some(spec), pose: None } => Ok(with_format(spec)),
-                    _ => {
-                        Err(Problem::new(Kind::BodyTooLarge, "Only a message that opens a session may be so long."))
-                    }
+                    _ => Err(Problem::new(Kind::BodyTooLarge, "Only a message that opens a session may be so long.")),
                 }));
             }
             Message::Text(text) => read::<StreamCommand>(text.as_bytes()),
