@@ -114,7 +114,7 @@ pub fn about(config: &Config) -> About {
 }
 
 /// A scene as a request would write it out.
-fn spec(scene: &Scene) -> SceneSpec {
+pub fn spec(scene: &Scene) -> SceneSpec {
     let mut surface = SurfaceSpec {
         kind: SurfaceKind::Flat,
         radius_mm: None,

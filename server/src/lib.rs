@@ -2,7 +2,7 @@
 //!
 //! Read in this order: `routes` (every URL), `handlers`, `requests` (what each sets in motion), [`wire`] (every message), `understand` (from
 //! the wire to the core), `answer` (one request from bytes to bytes), `simulate` (one sequence, line by line), `batch` (many poses at once),
-//! [`stream`] (poses over a WebSocket), `admission` (who is let in), [`pool`] and [`scenes`] (where it runs and what is kept), [`page`] (what
+//! [`stream`] (poses over a WebSocket), [`igtl`] (over OpenIGTLink), `kserve` (tensors), `admission` (who is let in), [`pool`] and [`scenes`] (where it runs and what is kept), [`page`] (what
 //! a browser sees). [`config`] is what the program can be told, [`problem`] how it says no, [`access`] who may ask, [`metrics`] what is counted.
 //! [`recording`] is a guest that looks on, `review` compares levels for the eye.
 //!
@@ -17,6 +17,8 @@ mod catalog;
 pub mod cli;
 pub mod config;
 mod handlers;
+pub mod igtl;
+mod kserve;
 pub mod metrics;
 pub mod page;
 pub mod pool;

@@ -18,7 +18,7 @@ use crate::problem::{Kind, Problem};
 use crate::simulate::{FIRST_AND_LAST, Lines, simulate};
 use crate::state::App;
 use crate::stopwatch::Stopwatch;
-use crate::stream::{self, LONGEST_MESSAGE};
+use crate::stream::{self, LONGEST_MESSAGE, WebSockets};
 
 /// What a simulation is expected to take, whatever it is: long enough to be seen by those who wait behind it.
 const SIMULATION_COST: Duration = Duration::from_secs(1);
@@ -105,7 +105,7 @@ impl App {
         Ok(upgrade.on_upgrade(async move |socket| {
             let metrics = Arc::clone(&app.metrics);
             metrics.streams.inc();
-            stream::serve(socket, app).await;
+            stream::serve(socket, WebSockets, app).await;
             metrics.streams.dec();
             drop((place, open));
         }))

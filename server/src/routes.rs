@@ -18,6 +18,7 @@ use utoipa_swagger_ui::SwaggerUi;
 
 use crate::access;
 use crate::handlers;
+use crate::kserve;
 use crate::metrics;
 use crate::page;
 use crate::state::AppState;
@@ -69,6 +70,7 @@ pub fn app(state: AppState) -> Router {
         .route("/", get(page::index))
         .route("/assets/{name}", get(page::asset))
         .route("/openapi.json", get(|| async { Json(api) }))
+        .merge(kserve::handlers::routes())
         .merge(SwaggerUi::new("/docs").config(docs))
         .fallback(handlers::not_found)
         .method_not_allowed_fallback(handlers::method_not_allowed)

@@ -10,6 +10,7 @@ pub mod catalog;
 pub mod cost;
 mod either;
 pub mod fixed;
+pub mod igtl;
 pub mod object;
 pub mod pose;
 pub mod request;
