@@ -2,7 +2,7 @@
 //!
 //! [`PreparedScene`] holds what depends on the scene alone; [`Workspace`] is a thread's memory. Read on in `types` (what goes in and comes
 //! out), `question` (a request in the patch's frame), `answer` (level by level), `linear` (the layered answer, start of all others),
-//! `finite_element` (the levels on meshes), `networks` and `learned` (the learned levels), `choice` (effects), `budget` and `expected_error` (levels),
+//! `finite_element` (the levels on meshes), `networks` and `learned` (the learned levels), `choice` (effects), `budget`, `expected_error` and `sampled` (levels),
 //! `indentation` (many steps of one needle). Not here: HTTP, clocks, threads.
 
 mod answer;
@@ -18,6 +18,7 @@ mod learned;
 pub mod linear;
 pub mod networks;
 mod question;
+pub mod sampled;
 pub(crate) mod topologies;
 pub mod types;
 

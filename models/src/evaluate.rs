@@ -3,6 +3,7 @@
 //! Read `errors` (how an error is measured) → `predictors` (who answers) → `baselines/*` → `tables` → `report`.
 
 pub mod baselines;
+pub mod coverage;
 pub mod errors;
 pub mod predictors;
 pub mod report;

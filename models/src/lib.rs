@@ -3,6 +3,7 @@
 //! Read in this order: `sample` (one load step of a path, as every program here sees it) → `shard` (samples on disk) → `dataset` (how
 //! they are made).
 
+pub mod calibrate;
 pub mod commands;
 pub mod contact;
 pub mod data;

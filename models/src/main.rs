@@ -19,6 +19,8 @@ enum Command {
     Train(commands::train::Arguments),
     /// Prints and keeps every table about a data set and the networks.
     Evaluate(commands::evaluate::Arguments),
+    /// Writes what the levels `linear` and `coarse` err by into the core.
+    Calibrate(commands::calibrate::Arguments),
     /// Makes samples of random indentation paths; the same command again goes on where it stopped.
     Dataset(commands::dataset::Arguments),
     /// Prints how far the surface moves in a data set, and how far off the cheap answers are.
@@ -35,6 +37,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Train(arguments) => commands::train::run(&arguments),
         Command::Evaluate(arguments) => commands::evaluate::run(&arguments),
+        Command::Calibrate(arguments) => commands::calibrate::run(&arguments),
         Command::Dataset(arguments) => commands::dataset::run(&arguments),
         Command::DatasetReport(arguments) => commands::dataset::run_report(&arguments),
         Command::TruthError(arguments) => commands::truth_error::run(&arguments),

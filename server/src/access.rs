@@ -1,6 +1,6 @@
 //! Who may ask: bearer tokens, and which web pages.
 //!
-//! Contract: without a token configured everybody who reaches the port may ask; with one, whatever is under `/v1` and `/metrics` needs it, and
+//! Contract: without a token configured everybody who reaches the port may ask; with one, whatever is under `/v1`, `/v2/models` and `/metrics` needs it, and
 //! the page, its documentation and the two health checks do not. Tokens are compared in a time that does not depend on where they differ. A
 //! stream from a web page of another origin is refused unless that origin is configured, because browsers ask nobody before they open one.
 
@@ -34,9 +34,13 @@ impl Access {
         let given =
             given.and_then(|value| value.split_once(' ')).filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"));
         let given = given.map_or("", |(_, token)| token.trim());
+        self.tokens.is_empty() || self.knows(given)
+    }
+
+    /// Whether this is one of the tokens.
+    pub fn knows(&self, given: &str) -> bool {
         let same = |token: &String| token.as_bytes().ct_eq(given.as_bytes());
-        let any = self.tokens.iter().map(same).fold(Choice::from(0), |any, same| any | same);
-        self.tokens.is_empty() || any.into()
+        self.tokens.iter().map(same).fold(Choice::from(0), |any, same| any | same).into()
     }
 
     /// Whether a stream may be opened from where the browser says that its page is; programs say nothing.
@@ -67,7 +71,8 @@ impl Access {
 /// Lets those through who may ask.
 pub async fn check(State(access): State<Access>, request: Request, next: Next) -> Response {
     let path = request.uri().path();
-    let guarded = path == "/metrics" || path == "/v1" || path.starts_with("/v1/");
+    let below = |root: &str| path.strip_prefix(root).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'));
+    let guarded = path == "/metrics" || below("/v1") || below("/v2/models");
     if guarded && !access.allows(request.headers()) {
         return Problem::new(Kind::Unauthorized, "The header Authorization has no token of this server.")
             .into_response();

@@ -77,6 +77,12 @@ fn at(index: usize, problem: Problem) -> Problem {
     problem.within(&format!("poses[{index}]"))
 }
 
+/// Poses of a piece, where each takes so long.
+pub fn piece_size(each: Duration) -> usize {
+    let in_time = (PIECE.as_secs_f64() / each.as_secs_f64().max(1e-9)) as usize;
+    in_time.clamp(1, MOST_IN_A_PIECE)
+}
+
 /// The answers as pieces of one JSON object.
 pub fn answers(
     batch: Batch,
@@ -86,8 +92,7 @@ pub fn answers(
     arrived: Instant,
 ) -> Result<impl Stream<Item = Result<Bytes, PoolError>>, Problem> {
     let each = times.mean(batch.shared.budget.level.unwrap_or(DEFAULT_LEVEL));
-    let in_time = (PIECE.as_secs_f64() / each.as_secs_f64().max(1e-9)) as usize;
-    let size = in_time.clamp(1, MOST_IN_A_PIECE);
+    let size = piece_size(each);
     let triangles = shared_triangles(&batch.scene)?;
     let mut head = br#"{"triangles":"#.to_vec();
     head.extend(write(&triangles, Layout::Compact).map_err(Problem::internal)?);

@@ -85,6 +85,14 @@ impl Bodies {
             let detail = format!("The request's Content-Type is {given}; it must be {wanted}.");
             return Err(Problem::new(Kind::UnsupportedMediaType, detail));
         }
+        self.any(body).await
+    }
+
+    /// The body of a request, whatever it announces.
+    ///
+    /// # Errors
+    /// As [`Bodies::json`], but for the media type.
+    pub async fn any(&self, body: Body) -> Result<Received, Problem> {
         match timeout(self.patience, collect(body, &self.large)).await {
             Ok(result) => result,
             Err(_) => Err(Problem::new(

@@ -30,6 +30,7 @@ use crate::wire::catalog::{
     About, AboutLimits, GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry,
     SceneList, WeightsEntry,
 };
+use crate::wire::cost::CostTable;
 use crate::wire::scene::{
     BondSpec, LayerSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec,
     TissueSpec,
@@ -70,6 +71,14 @@ pub fn levels() -> LevelList {
         LevelEntry { name: level.name(), what, cost }
     };
     LevelList { default: DEFAULT_LEVEL.name(), levels: Level::ALL.map(entry).into() }
+}
+
+/// What accuracy costs in time, as the program `accuracy` measured it.
+///
+/// # Errors
+/// When the committed measurement does not have the form that this version knows.
+pub fn accuracy() -> Result<CostTable, serde_json::Error> {
+    serde_json::from_str(include_str!("../../docs/accuracy/results.json"))
 }
 
 /// The gauges, thin to thick.

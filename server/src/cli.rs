@@ -33,7 +33,7 @@ use crate::times::Times;
 use crate::understand;
 use crate::wire::{PredictRequest, SimulateRequest};
 use crate::write::Layout;
-use crate::{App, page, run};
+use crate::{App, igtl, page, run};
 
 /// Exit code where the command line asks for what cannot be.
 const COMMAND_LINE_AT_FAULT: u8 = 2;
@@ -129,7 +129,13 @@ async fn serve_until_told(config: &Config, recorder: Option<Recorder>) -> io::Re
         tracing::info!("stopping after what was accepted");
         stop.cancel();
     });
-    run(listener, App::start_recorded(config, recorder)?, shutdown).await
+    let app = App::start_recorded(config, recorder)?;
+    if let Some(address) = config.igtl {
+        let listener = tokio::net::TcpListener::bind(address).await?;
+        tracing::info!("OpenIGTLink on {}", listener.local_addr()?);
+        tokio::spawn(igtl::listen(listener, app.clone()));
+    }
+    run(listener, app, shutdown).await
 }
 
 /// Returns when somebody presses ctrl-c or, on Unix, sends SIGTERM. Without a way to hear of either the service runs on, as it must.

@@ -20,8 +20,8 @@ use crate::metrics;
 use crate::problem::{Kind, MEDIA_TYPE, Problem, ProblemDocument};
 use crate::state::AppState;
 use crate::wire::{
-    About, BatchRequest, BatchResponse, GaugeList, LevelList, PredictRequest, PredictResponse, Readiness, SimulateLine,
-    SimulateRequest,
+    About, BatchRequest, BatchResponse, CostTable, GaugeList, LevelList, PredictRequest, PredictResponse, Readiness,
+    SimulateLine, SimulateRequest,
 };
 
 /// What the surface looks like when a needle at this pose pushes with this force.
@@ -125,6 +125,12 @@ pub async fn stream(
 #[utoipa::path(get, path = "/v1/levels", tag = "catalog", responses((status = 200, body = LevelList)))]
 pub async fn levels() -> Json<LevelList> {
     Json(catalog::levels())
+}
+
+/// What accuracy costs in time: errors and times of the levels, as measured with this version on the machine that it names.
+#[utoipa::path(get, path = "/v1/accuracy", tag = "catalog", responses((status = 200, body = CostTable)))]
+pub async fn accuracy() -> Result<Json<CostTable>, Problem> {
+    catalog::accuracy().map(Json).map_err(Problem::internal)
 }
 
 /// The needles that have a name.

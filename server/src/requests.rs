@@ -19,7 +19,7 @@ use crate::problem::{Kind, Problem};
 use crate::simulate::{FIRST_AND_LAST, Lines, simulate};
 use crate::state::App;
 use crate::stopwatch::Stopwatch;
-use crate::stream::{self, LONGEST_MESSAGE};
+use crate::stream::{self, LONGEST_MESSAGE, WebSockets};
 use crate::upload::{Upload, is_form};
 use crate::wire::StoredScene;
 
@@ -120,7 +120,7 @@ impl App {
         Ok(upgrade.on_upgrade(async move |socket| {
             let metrics = Arc::clone(&app.metrics);
             metrics.streams.inc();
-            stream::serve(socket, app).await;
+            stream::serve(socket, WebSockets, app).await;
             metrics.streams.dec();
             drop((place, open));
         }))

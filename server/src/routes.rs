@@ -18,6 +18,7 @@ use utoipa_swagger_ui::SwaggerUi;
 
 use crate::access;
 use crate::handlers;
+use crate::kserve;
 use crate::log;
 use crate::metrics;
 use crate::page;
@@ -48,6 +49,7 @@ pub fn app(state: AppState) -> Router {
         .routes(routes!(handlers::scenes, handlers::store_scene))
         .routes(routes!(handlers::scene, handlers::delete_scene))
         .routes(routes!(handlers::levels))
+        .routes(routes!(handlers::accuracy))
         .routes(routes!(handlers::gauges))
         .routes(routes!(handlers::about))
         .routes(routes!(handlers::metrics))
@@ -71,6 +73,7 @@ pub fn app(state: AppState) -> Router {
         .route("/", get(page::index))
         .route("/assets/{name}", get(page::asset))
         .route("/openapi.json", get(|| async { Json(api) }))
+        .merge(kserve::handlers::routes())
         .merge(SwaggerUi::new("/docs").config(docs))
         .fallback(handlers::not_found)
         .method_not_allowed_fallback(handlers::method_not_allowed)

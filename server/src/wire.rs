@@ -7,8 +7,10 @@
 
 pub mod batch;
 pub mod catalog;
+pub mod cost;
 mod either;
 pub mod fixed;
+pub mod igtl;
 pub mod object;
 pub mod pose;
 pub mod request;
@@ -20,6 +22,7 @@ pub mod stream;
 
 pub use batch::{BatchRequest, BatchResponse};
 pub use catalog::{About, GaugeList, LevelList, Readiness, SceneList};
+pub use cost::CostTable;
 pub use fixed::{Quaternion, Triangle, Vector};
 pub use request::PredictRequest;
 pub use response::PredictResponse;

@@ -3,6 +3,8 @@
 //! Contract: `tests/data/held_out.json` holds the answers and the limits; `cargo run --release -p retina-tests --bin held_out` makes it
 //! anew. Not here: laws (`invariants`), truth about the reference itself (`verification`).
 
+mod samples;
+
 use std::collections::HashMap;
 
 use nalgebra::Point3;

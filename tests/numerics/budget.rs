@@ -1,10 +1,12 @@
 //! Which level keeps a promise: the choice against every level's own numbers.
 
-use retina_core::needle::NeedleShape;
+use retina_core::needle::{NeedleShape, Tip};
 use retina_core::predict::budget::{Budget, DEFAULT_LEVEL, LevelTimes};
 use retina_core::predict::expected_error::{ExpectedError, Situation};
-use retina_core::predict::{Level, PredictError};
+use retina_core::predict::{Level, PredictError, sampled};
 use retina_core::scene::Scene;
+use retina_core::tissue::Tissue;
+use retina_core::tissue::ranges::{CHOROID, RETINA};
 
 const TIMES_MS: LevelTimes = [0.1, 0.5, 12.0, 12.5, 3000.0];
 
@@ -93,17 +95,41 @@ fn outside_of_what_was_measured_nothing_is_called_calibrated() {
     assert!(pressed().sampled);
     assert!(!situation(&NeedleShape::hemispherical(0.45), 20.0).sampled);
     assert!(!situation(&NeedleShape::hemispherical(0.257), 74.0).sampled);
-    let mut softer = scene.clone();
-    softer.tissue.retina[0].youngs_modulus_kpa *= 0.5;
-    assert!(!Situation::new(&softer, &NeedleShape::hemispherical(0.257), 20.0, 0.06, 0.15).sampled);
+    let on = |scene: &Scene| Situation::new(scene, &NeedleShape::hemispherical(0.257), 20.0, 0.06, 0.15);
+    // Tissue was sampled over the inner part of every range, in one layer of retina.
+    let stiffened = |place: f64| {
+        let mut other = scene.clone();
+        other.tissue.retina[0].youngs_modulus_kpa = sampled::logarithmic(&RETINA.youngs_modulus, place);
+        other.tissue.choroid.poisson_ratio = sampled::straight(&CHOROID.poisson_ratio, -place);
+        on(&other)
+    };
+    for place in [-sampled::INNER, 0.5, sampled::INNER] {
+        assert!(stiffened(place).sampled, "{place}");
+        assert!(stiffened(place).expected_error(Level::Coarse).calibrated, "{place}");
+    }
+    for place in [-1.02 * sampled::INNER, 1.02 * sampled::INNER] {
+        assert!(!stiffened(place).sampled, "{place}");
+        assert!(!stiffened(place).expected_error(Level::Coarse).calibrated, "{place}");
+    }
+    let with = |tissue: Tissue| on(&Scene { tissue, ..scene.clone() });
+    assert!(!with(Tissue::with_inner_limiting_membrane()).sampled);
+    assert!(!with(Tissue::rabbit_sublayers()).sampled);
+    // Tips by default, or with the edges and angles that were drawn.
+    let radius_mm = 0.257;
+    let edged = |share: f64| NeedleShape {
+        tip: Tip::Flat { edge_radius_mm: share * radius_mm },
+        ..NeedleShape::flat(radius_mm)
+    };
+    assert!(situation(&NeedleShape::flat(radius_mm), 20.0).sampled && situation(&edged(0.2), 20.0).sampled);
+    assert!(!situation(&edged(0.5), 20.0).sampled);
     // Errors were measured without friction and at the pressure of the rest surface.
     let (mut rough, mut pressed_eye) = (scene.clone(), scene.clone());
     rough.friction_coefficient = 0.1;
     pressed_eye.pressure_kpa += 1.0;
     for other in [&rough, &pressed_eye] {
-        assert!(!Situation::new(other, &NeedleShape::hemispherical(0.257), 20.0, 0.06, 0.15).sampled);
+        assert!(!on(other).sampled);
     }
     // Nothing that moves nothing is wrong.
-    let still = Situation::new(&softer, &NeedleShape::hemispherical(0.257), 20.0, 0.0, 0.0);
+    let still = Situation::new(&rough, &NeedleShape::hemispherical(0.257), 20.0, 0.0, 0.0);
     assert_eq!(still.expected_error(Level::Linear).p95_um, 0.0);
 }

@@ -10,11 +10,11 @@ use retina_core::approach::first_touch;
 use retina_core::needle::Tip;
 use retina_core::predict::finite_element::COARSE;
 use retina_core::predict::indentation::{EFFECTS, Indentation, Memory};
-use retina_core::predict::{Control, EffectChoice, Level, PreparedScene, Request, Workspace};
+use retina_core::predict::{Control, EffectChoice, Level, PreparedScene, Request, Workspace, sampled};
 use retina_core::progress::Silent;
 use retina_models::dataset::DatasetError;
 use retina_models::dataset::deformcontact::{ContactSample, export, import};
-use retina_models::dataset::draw::{INNER, PathPlan, STEPS, TILT_DEG, plan};
+use retina_models::dataset::draw::{Depths, LIGHT_SHARE, PathPlan, STEPS, plan};
 use retina_models::dataset::manifest::Manifest;
 use retina_models::dataset::part::Part;
 use retina_models::dataset::path::before_limit_point;
@@ -162,7 +162,8 @@ fn samples_obey_the_laws_of_their_equilibrium() {
 
 #[test]
 fn pushed_with_the_force_of_a_step_the_needle_stops_at_its_travel() {
-    let plan = (0..).find_map(|path| plan(5, path, &[1]).filter(|plan| plan.needle.shape.tip == Tip::Hemispherical));
+    let plan = (0..)
+        .find_map(|path| plan(5, path, &[1], Depths::Deep).filter(|plan| plan.needle.shape.tip == Tip::Hemispherical));
     let plan = plan.unwrap();
     let scene = PreparedScene::new(plan.scene.clone()).unwrap();
     let mut held = Indentation::new(&scene, plan.needle, plan.direction, TRUTH).unwrap();
@@ -208,24 +209,23 @@ fn a_path_ends_where_it_takes_no_more_force() {
 fn paths_belong_to_one_split_and_splits_to_their_ranges() {
     let mut counts = BTreeMap::new();
     for path in 0..3000 {
-        let plan = plan(1, path, &[0, 1, 2]).unwrap();
+        let light = plan(1, path, &[0, 1, 2], Depths::Light).unwrap();
+        let plan = plan(1, path, &[0, 1, 2], Depths::Deep).unwrap();
         *counts.entry(plan.split).or_insert(0) += 1;
-        let tissue = &plan.scene.tissue;
         plan.scene.validate().unwrap();
         plan.needle.validate().unwrap();
         let tilt = 180.0 - plan.needle.direction().z.acos().to_degrees();
         assert!(plan.depth_shares.is_sorted() && plan.depth_shares[STEPS - 1] <= 1.0);
-        let extreme = |value: f64, range: &retina_core::range::ParameterRange| {
-            let end = if value < range.default { range.min } else { range.max };
-            (value / range.default).ln().abs() > INNER * (end / range.default).ln().abs() * (1.0 + 1e-9)
-        };
-        let choroid = &retina_core::tissue::ranges::CHOROID.youngs_modulus;
+        // The same path otherwise.
+        assert!(light.needle == plan.needle && light.scene == plan.scene);
+        assert!(light.depth_shares.is_sorted() && light.depth_shares[STEPS - 1] < plan.depth_shares[STEPS - 1]);
+        assert!(light.depth_shares[0] >= LIGHT_SHARE[0] * (1.0 - 1e-9));
         match plan.split {
-            Split::Outside => {}
-            Split::Hard => assert!(!plan.default_tissue),
+            Split::Outside => assert!(sampled::has_scene(&plan.scene)),
+            Split::Hard => assert!(!plan.default_tissue && !sampled::has_scene(&plan.scene)),
             _ => {
-                assert!(!extreme(tissue.choroid.youngs_modulus_kpa, choroid));
-                assert!((TILT_DEG[0]..=TILT_DEG[1] + 1e-9).contains(&tilt), "{tilt}");
+                assert!(sampled::has_scene(&plan.scene) && sampled::has_needle(&plan.needle.shape));
+                assert!((sampled::TILT_DEG[0]..=sampled::TILT_DEG[1] + 1e-9).contains(&tilt), "{tilt}");
             }
         }
     }

@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::harness::{get, post, predict, request, send};
 use crate::schema::{assert_matches, check, description};
 
-const ROUTES: [(&str, &str); 15] = [
+const ROUTES: [(&str, &str); 16] = [
     ("post", "/v1/predict"),
     ("post", "/v1/predict/batch"),
     ("post", "/v1/simulate"),
@@ -17,6 +17,7 @@ const ROUTES: [(&str, &str); 15] = [
     ("get", "/v1/scenes/{id}"),
     ("delete", "/v1/scenes/{id}"),
     ("get", "/v1/levels"),
+    ("get", "/v1/accuracy"),
     ("get", "/v1/gauges"),
     ("get", "/v1/about"),
     ("get", "/metrics"),
@@ -46,6 +47,7 @@ fn every_answer_matches_its_schema() {
     for (path, schema) in [
         ("/v1/scenes", "SceneList"),
         ("/v1/levels", "LevelList"),
+        ("/v1/accuracy", "CostTable"),
         ("/v1/gauges", "GaugeList"),
         ("/healthz", "Readiness"),
         ("/nowhere", "ProblemDocument"),

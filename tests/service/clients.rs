@@ -1,23 +1,52 @@
 //! The clients of `clients/`, against a service on a socket.
 
-use std::process::Command;
+mod ros2;
+mod unity;
 
-use crate::harness::Running;
+use std::io::Write as _;
+use std::process::{Command, Stdio};
 
-/// What `press.py` prints; skipped, and said so, only where there is no Python.
-fn press(arguments: &[&str]) -> Option<(bool, String)> {
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../clients/python/press.py");
+use crate::harness::{Running, get};
+
+/// Folder of the clients.
+const CLIENTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../clients");
+
+/// What a Python program of the clients prints that is given `input`; `None`, and said so, only where there is no Python.
+fn python(script: &str, arguments: &[&str], input: &str) -> Option<(bool, String)> {
     let python = if cfg!(windows) { "python" } else { "python3" };
-    match Command::new(python).arg("-B").arg(script).args(arguments).env("PYTHONIOENCODING", "utf-8").output() {
-        Ok(run) => {
+    let mut command = Command::new(python);
+    command.arg("-B").arg(format!("{CLIENTS}/{script}")).args(arguments);
+    command.env("PYTHONIOENCODING", "utf-8").env("PYTHONPATH", format!("{CLIENTS}/python/src"));
+    match command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn() {
+        Ok(mut child) => {
+            // A program that reads nothing may have closed it.
+            let _ = child.stdin.take().expect("piped").write_all(input.as_bytes());
+            let run = child.wait_with_output().expect("output");
             let text = [run.stdout, run.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
             Some((run.status.success(), text.replace("\r\n", "\n")))
         }
         Err(error) => {
-            eprintln!("no {python}: {error}; the client is not tried");
+            eprintln!("no {python}: {error}; {script} is not tried");
             None
         }
     }
+}
+
+/// What `press.py` prints.
+fn press(arguments: &[&str]) -> Option<(bool, String)> {
+    python("python/press.py", arguments, "")
+}
+
+#[test]
+fn the_python_types_are_those_of_the_openapi_document() {
+    let document = get("/openapi.json").body.to_string();
+    let Some((success, text)) = python("python/generate_messages.py", &["-"], &document) else { return };
+    assert!(success, "{text}");
+    let committed = include_str!("../../clients/python/src/retina_client/messages.py").replace("\r\n", "\n");
+    assert!(
+        committed == text,
+        "clients/python/src/retina_client/messages.py is stale: start the service, then `python3 clients/python/generate_messages.py`"
+    );
 }
 
 #[test]

@@ -110,10 +110,15 @@ pub struct Running {
 impl Running {
     /// Starts a service with these arguments and waits until it is ready.
     pub fn start(arguments: &[&str]) -> Self {
+        Self::of(state(arguments))
+    }
+
+    /// Serves this on a socket and waits until it is ready.
+    pub fn of(state: AppState) -> Self {
         let listener = runtime().block_on(TcpListener::bind("127.0.0.1:0")).expect("port");
         let address = listener.local_addr().expect("address");
         let shutdown = CancellationToken::new();
-        let (state, stop) = (state(arguments), shutdown.clone());
+        let stop = shutdown.clone();
         let ended = thread::spawn(move || {
             runtime().block_on(run(listener, state, stop)).expect("service");
         });

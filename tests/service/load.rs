@@ -8,15 +8,15 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use retina_core::predict::Workspace;
-use retina_server::pool::{Pool, PoolError, Ticket};
 use retina_server::library::Store;
 use retina_server::library::reader::Reader;
+use retina_server::pool::{Pool, PoolError, Ticket};
 use retina_server::scenes::Scenes;
 use retina_server::wire::request::SceneChoice;
 use retina_server::write::{Layout, write};
 use serde_json::{Value, json};
 
-use crate::harness::{Running, agent, request};
+use crate::harness::{Running, agent, request, runtime};
 
 #[test]
 fn a_full_queue_says_when_to_come_back() {

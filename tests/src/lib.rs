@@ -3,10 +3,15 @@
 pub mod audit;
 pub mod cap;
 pub mod cost;
+pub mod fuzzed;
 pub mod held_out;
+pub mod held_out_samples;
+pub mod igtl_client;
 pub mod laws;
+pub mod local_service;
 pub mod malformed;
 pub mod overload;
+pub mod promise;
 pub mod random_scene;
 pub mod search;
 pub mod spawned;

@@ -4,6 +4,7 @@ import { Color } from "three";
 
 import "./style/page.css";
 import "./style/controls.css";
+import "./style/chart.css";
 import { Compare } from "./compare";
 import { inspect } from "./inspect";
 import { keyboard } from "./keyboard";

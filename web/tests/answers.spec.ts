@@ -15,9 +15,13 @@ test("a level is switched by its button and by its key", async ({ retina }) => {
 });
 
 test("compare shows the true error of every level, node by node", async ({ retina }) => {
+  const levels = await retina.evaluate(
+    async (): Promise<unknown[]> =>
+      ((await (await fetch("/v1/levels")).json()) as { levels: unknown[] }).levels,
+  );
   await retina.locator("#compare").click();
   const rows = retina.locator("#comparison tbody tr");
-  await expect(rows).toHaveCount(3, { timeout: 60_000 });
+  await expect(rows).toHaveCount(levels.length, { timeout: 60_000 });
   await expect(rows.last()).toContainText("reference");
   await retina.locator("label", { hasText: /^error$/ }).click();
   const { errors, linear } = await retina.evaluate(() => ({
@@ -33,6 +37,40 @@ test("compare shows the true error of every level, node by node", async ({ retin
   await retina.keyboard.press("s");
   await settled(retina);
   expect(await retina.evaluate(() => window.retina.errorsUm)).toBeUndefined();
+});
+
+test("the chart shows what accuracy costs, and choosing a point chooses the setting", async ({
+  retina,
+  server,
+}) => {
+  const asked = (): Promise<unknown> => retina.evaluate(() => window.retina.settings.accuracy);
+  const ring = retina.locator("#cost-now circle");
+  await expect(ring).toHaveCount(1);
+  const before = await ring.getAttribute("cy");
+  await retina
+    .locator("#cost")
+    .getByRole("button", { name: /^Level coarse/ })
+    .click();
+  await settled(retina);
+  expect(await asked()).toEqual({ level: "coarse" });
+  expect(await retina.evaluate(() => window.retina.answer?.accuracy.level)).toBe("coarse");
+  // Finite elements take longer, and time runs upwards.
+  await expect
+    .poll(async () => Number(await ring.getAttribute("cy")))
+    .toBeLessThan(Number(before) - 20);
+  await retina.locator("#cost").screenshot({ path: "artefacts/cost.png" });
+  // A place between the points asks for a tolerance: the middle of the axis from 0.1 to 200 µm.
+  const plane = await retina.locator("#cost .plane").boundingBox();
+  if (!plane) throw new Error("no plane");
+  await retina.mouse.click(plane.x + plane.width / 2, plane.y + plane.height - 4);
+  await settled(retina);
+  const { max_error_um } = (await asked()) as { max_error_um: number };
+  expect(max_error_um).toBeGreaterThan(4.2);
+  expect(max_error_um).toBeLessThan(4.8);
+  // Other requests have other measurements.
+  await expect(retina.locator(".cost-chart")).toContainText("round tips");
+  await open(retina, server, "#tip=flat");
+  await expect(retina.locator(".cost-chart")).toContainText("flat and bevelled tips");
 });
 
 test("a puncture is refused in words, beside the force, with a way back", async ({

@@ -3,6 +3,7 @@
 import { expect, test } from "@playwright/test";
 
 import { roundUp, scaleFor } from "../src/colour/scale";
+import { decades, frontier, place, valueAt } from "../src/model/cost";
 import { meanCurvature, surfaceStrain } from "../src/model/fields";
 import { NewestWins } from "../src/model/newest";
 import { orientation, shaftDirection } from "../src/model/needle_pose";
@@ -10,7 +11,7 @@ import { withNumbers } from "../src/model/paths";
 import { INITIAL, type Settings } from "../src/model/settings";
 import { nodeErrors, statistics } from "../src/model/statistics";
 import { fromHash, toHash } from "../src/model/url";
-import type { Surface, Triangle, Vector } from "../src/model/wire";
+import type { CostStanding, Surface, Triangle, Vector } from "../src/model/wire";
 
 /** A grid with the given height and normal. */
 function grid(
@@ -167,4 +168,23 @@ test("newest wins: one question at a time, those between are left out, a slow on
   loop.offer(4);
   await expect.poll(() => taken).toEqual([1, 3, 4]);
   expect(asked).toEqual([1, 3, 99, 4]);
+});
+
+test("the chart's axes are logarithmic, and its frontier is beaten by none", () => {
+  const axis = { from: 0.1, to: 1000, start: 200, end: 0 };
+  expect(place(axis, 10)).toBeCloseTo(100, 9);
+  expect(valueAt(axis, place(axis, 7.3))).toBeCloseTo(7.3, 9);
+  expect(place(axis, 1e9)).toBe(0);
+  expect(decades(axis)).toHaveLength(5);
+  const standing = (name: string, median_um: number, median_ms: number): CostStanding => ({
+    name,
+    knob: "level",
+    failed: 0,
+    median_um,
+    p99_um: median_um,
+    median_ms,
+    p99_ms: median_ms,
+  });
+  const all = [standing("slow", 0.5, 100), standing("beaten", 3, 20), standing("fast", 2, 10)];
+  expect(frontier(all).map(({ name }) => name)).toEqual(["fast", "slow"]);
 });

@@ -1,24 +1,23 @@
 //! How far a level's answer is likely to be from `reference`, before it is computed.
 //!
-//! The error is that of the worst of the patch's nodes (µm). It is read from quantiles measured once (`calibration.rs`, written by the
-//! `calibrate` program) in bins of what the linear answer knows: the kind of tip and the mean strain. In a bin the error scales with the
+//! The error is that of the worst of the patch's nodes (µm). It is read from quantiles measured once (`calibration.rs`, written by
+//! `retina-models calibrate` from a data set) in bins of what the linear answer knows: the kind of tip and the mean strain. In a bin the error scales with the
 //! depth, so the quantiles are of error over depth. The 95 % bound of n samples is their ⌈0.95 (n + 1)⌉-th smallest, which a new sample of the same
 //! kind stays below with at least that probability, whatever the distribution (split conformal prediction: Vovk et al.,
 //! *Algorithmic Learning in a Random World*, 2005). Outside of what was sampled the numbers are still given, and called uncalibrated.
 
 use super::calibration::{COARSE, LINEAR};
+use super::sampled;
 use super::types::Level;
-use crate::needle::{Gauge, NeedleShape, Tip};
-use crate::scene::{Scene, SceneSurface};
+use crate::needle::{NeedleShape, Tip};
+use crate::scene::Scene;
 
 /// Upper ends of the bins of mean strain; the last bin has none.
-pub const STRAIN_BINS: [f64; 1] = [0.1];
+pub const STRAIN_BINS: [f64; 5] = [0.05, 0.1, 0.2, 0.3, 0.45];
 /// Number of bins.
 pub const BINS: usize = STRAIN_BINS.len() + 1;
-/// Gauges between which needles were sampled, thin to thick.
-pub const CALIBRATED_GAUGES: [&str; 2] = ["41G", "23G"];
-/// Largest angle of the needle to the inward normal that was sampled (degrees): 60 to the patch's z axis and the eye's curvature.
-pub const CALIBRATED_ANGLE_DEG: f64 = 65.0;
+/// Kinds of tip: half balls, flat ends, bevels.
+pub const TIPS: usize = 3;
 
 /// What refinement may still change at level `reference`: this much (µm) or [`REFERENCE_SHARE`] of the depth, whichever is more.
 pub const REFERENCE_ERROR_UM: f64 = 0.5;
@@ -41,8 +40,8 @@ pub struct Quantiles {
 /// What is known of a request before a level computes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Situation {
-    /// Whether the tip has an edge.
-    pub edged: bool,
+    /// Kind of the tip, see [`tip_kind`].
+    pub tip: usize,
     /// Depth of the linear answer (µm).
     pub depth_um: f64,
     /// That depth over the thickness of what yields.
@@ -73,6 +72,25 @@ impl ExpectedError {
     pub const UNKNOWN: Self = ExpectedError { median_um: f64::INFINITY, p95_um: f64::INFINITY, calibrated: false };
 }
 
+/// Number of a tip's kind, below [`TIPS`].
+pub fn tip_kind(tip: &Tip) -> usize {
+    match tip {
+        Tip::Hemispherical => 0,
+        Tip::Flat { .. } => 1,
+        Tip::Bevelled { .. } => 2,
+    }
+}
+
+/// Measured quantiles of `level`, where it has a table, under a kind of tip at a mean strain.
+pub fn quantiles(level: Level, tip: usize, strain: f64) -> Option<&'static Quantiles> {
+    let table = match level {
+        Level::Linear => &LINEAR,
+        Level::Coarse => &COARSE,
+        Level::Network | Level::Corrected | Level::Reference => return None,
+    };
+    Some(&table[tip][bin(strain)])
+}
+
 /// The bin of a mean strain.
 pub fn bin(strain: f64) -> usize {
     STRAIN_BINS.iter().filter(|&&end| strain >= end).count()
@@ -81,23 +99,9 @@ pub fn bin(strain: f64) -> usize {
 impl Situation {
     /// The situation of `shape` in `scene`, `angle_deg` off the normal, at the linear answer's depth and strain.
     pub fn new(scene: &Scene, shape: &NeedleShape, angle_deg: f64, depth_mm: f64, strain: f64) -> Self {
-        let radius_mm = |name| Gauge::from_name(name).map_or(f64::NAN, |gauge| gauge.radius_mm());
-        let [thin_mm, thick_mm] = CALIBRATED_GAUGES.map(radius_mm);
-        let default_tip = match shape.tip {
-            Tip::Hemispherical => true,
-            Tip::Flat { .. } => *shape == NeedleShape::flat(shape.radius_mm),
-            Tip::Bevelled { .. } => *shape == NeedleShape::bevelled(shape.radius_mm),
-        };
-        let built_in = Scene::built_in_names().iter().filter_map(|name| Scene::built_in(name));
-        let sampled = !matches!(scene.surface, SceneSurface::Mesh(_))
-            && built_in.into_iter().any(|known| known.tissue == scene.tissue && known.surface == scene.surface)
-            && scene.friction_coefficient == 0.0
-            && scene.pressure_change_kpa() == 0.0
-            && (thin_mm..=thick_mm).contains(&shape.radius_mm)
-            && default_tip
-            && angle_deg <= CALIBRATED_ANGLE_DEG;
+        let sampled = sampled::has_scene(scene) && sampled::has_needle(shape) && angle_deg <= sampled::ANGLE_DEG;
         Situation {
-            edged: shape.tip != Tip::Hemispherical,
+            tip: tip_kind(&shape.tip),
             depth_um: depth_mm * 1e3,
             strain,
             sampled,
@@ -113,21 +117,19 @@ impl Situation {
             // Nothing moves, exactly.
             return ExpectedError { median_um: 0.0, p95_um: 0.0, calibrated: true };
         }
-        let table = match level {
-            Level::Linear => &LINEAR,
-            Level::Coarse => &COARSE,
+        let quantiles = match level {
             Level::Network => return self.network.unwrap_or(ExpectedError::UNKNOWN),
             Level::Corrected => return self.corrected.unwrap_or(ExpectedError::UNKNOWN),
-            Level::Reference => {
-                let bound = REFERENCE_ERROR_UM.max(REFERENCE_SHARE * self.depth_um);
-                return ExpectedError {
-                    median_um: REFERENCE_MEDIAN_SHARE * bound,
-                    p95_um: bound,
-                    calibrated: self.sampled,
-                };
-            }
+            Level::Linear | Level::Coarse | Level::Reference => quantiles(level, self.tip, self.strain),
         };
-        let quantiles = &table[usize::from(self.edged)][bin(self.strain)];
+        let Some(quantiles) = quantiles else {
+            let bound = REFERENCE_ERROR_UM.max(REFERENCE_SHARE * self.depth_um);
+            return ExpectedError {
+                median_um: REFERENCE_MEDIAN_SHARE * bound,
+                p95_um: bound,
+                calibrated: self.sampled,
+            };
+        };
         let (median_um, p95_um) = (quantiles.median * self.depth_um, quantiles.p95 * self.depth_um);
         let calibrated = self.sampled && quantiles.p95.is_finite();
         match level {

@@ -104,7 +104,7 @@ impl Question<'_> {
             // The heads need the coarse answer; what they came to in the validation, by bins, does not.
             _ => {
                 let known = network.knows_depth(situation.strain as f32);
-                let ratios = network.prior(situation.edged, situation.strain as f32);
+                let ratios = network.prior(situation.tip != 0, situation.strain as f32);
                 let [median_mm, p95_mm] = ratios.map(|ratio| f64::from(ratio) * linear.depth_mm);
                 situation.with_rigid_needle(
                     median_mm * 1e3,

@@ -106,7 +106,8 @@ impl Question<'_> {
     }
 
     pub(crate) fn situation_under(&self, linear: &LinearAnswer) -> Situation {
-        let mut situation = self.situation(linear.depth_mm, linear.depth_mm / self.yielding_mm(), Some(&linear.press));
+        let mut situation =
+            self.situation(linear.depth_mm, linear.depth_mm / self.yielding_under(&linear.press), Some(&linear.press));
         // Needles were sampled with rigid shafts.
         let bending = self.bending(Some(linear));
         if tool_flex::report(&self.request.effects, Level::Coarse, true, &bending).simulated {
@@ -192,6 +193,12 @@ impl Question<'_> {
         tissue.retina_thickness_mm() + tissue.choroid.thickness_mm
     }
 
+    /// The same where the needle touches: a pit thins the retina (mm).
+    fn yielding_under(&self, press: &Press) -> f64 {
+        let [x, y] = press.touch.parameter;
+        self.yielding_mm() - self.patch().surface.column(x, y).retina_thinning_mm
+    }
+
     pub(super) fn check_pressure(&self, press: &Press) -> Result<(), PredictError> {
         if let Load::Force(force_mn) = press.load {
             let radius_mm = self.tool.body.radius_mm();
@@ -214,9 +221,7 @@ impl Question<'_> {
     }
 
     pub(super) fn check_depth(&self, linear: &LinearAnswer) -> Result<(), PredictError> {
-        let [x, y] = linear.press.touch.parameter;
-        let thinning_mm = self.patch().surface.column(x, y).retina_thinning_mm;
-        let limit_mm = MAX_DEPTH_SHARE * (self.yielding_mm() - thinning_mm);
+        let limit_mm = MAX_DEPTH_SHARE * self.yielding_under(&linear.press);
         let depth_mm = linear.depth_mm;
         if depth_mm > limit_mm { Err(PredictError::TooDeep { depth_mm, limit_mm }) } else { Ok(()) }
     }

@@ -18,9 +18,9 @@ const REPORT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/REPORT.md");
 /// Arguments of `evaluate`.
 #[derive(Args, Clone, Debug)]
 pub struct Arguments {
-    /// Folder with the shards of a data set.
-    #[arg(long)]
-    data: PathBuf,
+    /// Folder with the shards of a data set; several may be given.
+    #[arg(long, required = true)]
+    data: Vec<PathBuf>,
     /// Folder with the weights.
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,

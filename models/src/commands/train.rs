@@ -37,9 +37,9 @@ pub struct Arguments {
     /// Which network.
     #[arg(long, value_enum)]
     network: Which,
-    /// Folder with the shards of a data set.
-    #[arg(long)]
-    data: PathBuf,
+    /// Folder with the shards of a data set; several may be given.
+    #[arg(long, required = true)]
+    data: Vec<PathBuf>,
     /// Folder for checkpoint, weights, card and record; a run found there goes on.
     #[arg(long)]
     out: PathBuf,

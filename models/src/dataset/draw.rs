@@ -1,44 +1,38 @@
 //! What a path is: split, scene, tissue, needle, direction and depths, drawn from the seed and the path's number alone.
 //!
-//! A number of the tissue is drawn by its *place* in its range: 0 the default, −1 and 1 the ends, between them straight or, for moduli, in the
-//! logarithm. Training, validation and test draw it from a triangle over the inner four fifths (places to ±[`INNER`]), and take the built-in
-//! tissue as it is for a share of the paths; `hard` puts at least one number of retina or choroid into the outer fifth; `outside` leaves the
-//! tissue there and leads the needle beyond the working range. Units: mm, degrees, kPa.
+//! A number of the tissue is drawn by its *place* in its range (`retina_core::predict::sampled`). Training, validation and test draw it from a
+//! triangle over the inner four fifths (places to ±[`INNER`]), and take the built-in tissue as it is for a share of the paths; `hard` puts at least
+//! one number of retina or choroid into the outer fifth; `outside` leaves the tissue there and leads the needle beyond the working range.
+//! Units: mm, degrees, kPa.
 //!
 //! Not here: whether the path's equilibria are found (`path`).
 
 use std::f64::consts::TAU;
 
+use clap::ValueEnum;
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use retina_core::approach::first_touch;
-use retina_core::needle::{Gauge, Needle, NeedleShape, Tip};
+use retina_core::needle::{Needle, NeedleShape, Tip};
 use retina_core::patch::Patch;
-use retina_core::range::ParameterRange;
-use retina_core::scene::{LEAST_PIT_FLOOR_MM, Scene, SceneSurface};
+use retina_core::predict::sampled::{
+    BEVEL_DEG, EDGE_SHARE, INNER, TILT_DEG, gauge_radii_mm, logarithmic, retina_ranges, straight,
+};
+use retina_core::scene::Scene;
 use retina_core::tissue::{Layer, ranges};
+use serde::{Deserialize, Serialize};
 
 use crate::sample::Split;
 
 /// Shares of the paths that belong to each split, in the order of [`Split::ALL`].
 pub const SPLIT_SHARES: [f64; 5] = [0.80, 0.08, 0.08, 0.03, 0.01];
-/// Largest place in its range of a number that is trained on.
-pub const INNER: f64 = 0.8;
 /// Share of the paths (but of `hard`) on the scene's own tissue.
 pub const DEFAULT_TISSUE_SHARE: f64 = 0.3;
-/// The thinnest and the thickest needle.
-pub const GAUGES: [&str; 2] = ["41G", "23G"];
 /// Shares of half balls and of flat ends; the rest are bevelled.
 pub const TIP_SHARES: [f64; 2] = [0.7, 0.15];
 /// Share of the flat and bevelled tips that have the default edge and angle.
 pub const DEFAULT_TIP_SHARE: f64 = 0.5;
-/// Edge radius of the others, in needle radii.
-pub const EDGE_SHARE: [f64; 2] = [0.1, 0.3];
-/// Angle of the bevel of the others (degrees).
-pub const BEVEL_DEG: [f64; 2] = [25.0, 60.0];
 /// First touch reaches this far from the patch's centre in x and y (mm).
 pub const REACH_MM: f64 = 0.8;
-/// Tilt of the needle (degrees), and what `outside` has.
-pub const TILT_DEG: [f64; 2] = [0.0, 60.0];
 /// Tilt of `outside` (degrees).
 pub const OUTSIDE_TILT_DEG: [f64; 2] = [60.0, 70.0];
 /// Angle between needle and direction (degrees).
@@ -51,22 +45,29 @@ pub const OUTSIDE_RADIUS_MM: f64 = 0.45;
 pub const CLEARANCE_MM: [f64; 2] = [0.0, 0.2];
 /// Steps of a path.
 pub const STEPS: usize = 6;
-/// Depth of the last step, in shares of what the limits of depth and puncture allow by linear elasticity.
+/// Depth of the last step of a deep path, in shares of what the limits of depth and puncture allow by linear elasticity.
 pub const DEEPEST_SHARE: [f64; 2] = [0.8, 1.0];
-/// Exponent of the depth of step k of n, (k/n)^γ: below 1 the steps are dense where the motion is large.
+/// Depths of the steps of a light path, in the same shares, drawn evenly in the logarithm.
+pub const LIGHT_SHARE: [f64; 2] = [0.01, 0.3];
+/// Exponent of the depth of step k of n of a deep path, (k/n)^γ: below 1 the steps are dense where the motion is large.
 pub const DEPTH_EXPONENT: f64 = 0.5;
+/// How deep the steps of the paths go.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Depths {
+    /// Towards the limits of depth and puncture: what moves most.
+    #[default]
+    Deep,
+    /// From a touch to where the deep ones begin.
+    Light,
+}
+
 /// Largest part of the distance to the step before by which a step's depth is drawn back.
 pub const JITTER: f64 = 0.5;
 /// Poses drawn before a path is given up: one that leans too far off the surface or touches beyond [`REACH_MM`] is drawn again.
 const MOST_POSES: usize = 1000;
 /// Largest angle of needle and direction to the inward normal (degrees): one degree inside what prediction allows.
 const MOST_ANGLE_DEG: f64 = 74.0;
-
-/// Radii of the thinnest and the thickest needle (mm).
-pub fn gauge_radii_mm() -> [f64; 2] {
-    // A name that is not known would give a radius that no shape accepts.
-    GAUGES.map(|name| Gauge::from_name(name).map_or(f64::NAN, |gauge| gauge.radius_mm()))
-}
 
 /// A path before it is computed.
 pub struct PathPlan {
@@ -103,7 +104,7 @@ struct Draw {
 }
 
 /// The plan of path number `path` from `seed`, on one of the built-in scenes that `scenes` names by index. `None` if no pose was found.
-pub fn plan(seed: u64, path: u32, scenes: &[u8]) -> Option<PathPlan> {
+pub fn plan(seed: u64, path: u32, scenes: &[u8], depths: Depths) -> Option<PathPlan> {
     let mut random = random(seed, path);
     let mut left = random.f64();
     let drawn = SPLIT_SHARES.iter().position(|share| {
@@ -123,7 +124,10 @@ pub fn plan(seed: u64, path: u32, scenes: &[u8]) -> Option<PathPlan> {
     let beyond = draw.beyond();
     let shape = draw.shape(beyond[0]);
     let (needle, direction) = (0..MOST_POSES).find_map(|_| draw.pose(shape, beyond[1], beyond[2], &patch))?;
-    let depth_shares = draw.depths();
+    let depth_shares = match depths {
+        Depths::Deep => draw.deep(),
+        Depths::Light => draw.light(),
+    };
     Some(PathPlan { path, split, scene_index, scene, default_tissue, needle, direction, depth_shares })
 }
 
@@ -152,18 +156,7 @@ impl Draw {
             let outer = (INNER + (1.0 - INNER) * draw.random.f64()) * if draw.random.bool() { 1.0 } else { -1.0 };
             if extreme { outer } else { inner }
         };
-        let pit_mm = match scene.surface {
-            SceneSurface::FovealPit { depth_mm, .. } => depth_mm + LEAST_PIT_FLOOR_MM,
-            _ => 0.0,
-        };
-        let retina = ranges::LayerRanges {
-            thickness: ParameterRange {
-                default: scene.tissue.retina[0].thickness_mm,
-                min: ranges::RETINA.thickness.min.max(pit_mm),
-                ..ranges::RETINA.thickness
-            },
-            ..ranges::RETINA
-        };
+        let retina = retina_ranges(scene);
         let mut layer = |draw: &mut Self, range: &ranges::LayerRanges| Layer {
             thickness_mm: straight(&range.thickness, place(draw)),
             youngs_modulus_kpa: logarithmic(&range.youngs_modulus, place(draw)),
@@ -224,7 +217,14 @@ impl Draw {
         Some((needle, direction))
     }
 
-    fn depths(&mut self) -> [f64; STEPS] {
+    fn light(&mut self) -> [f64; STEPS] {
+        let logarithms = LIGHT_SHARE.map(f64::ln);
+        let mut shares = [0.0; STEPS].map(|_: f64| self.between(logarithms).exp());
+        shares.sort_by(f64::total_cmp);
+        shares
+    }
+
+    fn deep(&mut self) -> [f64; STEPS] {
         let deepest = self.between(DEEPEST_SHARE);
         let mut shares = [0.0; STEPS];
         for (step, share) in shares.iter_mut().enumerate() {
@@ -233,16 +233,4 @@ impl Draw {
         }
         shares
     }
-}
-
-/// The number at a place of its range, straight between default and ends.
-fn straight(range: &ParameterRange, place: f64) -> f64 {
-    let end = if place < 0.0 { range.min } else { range.max };
-    range.default + place.abs() * (end - range.default)
-}
-
-/// The same in the logarithm.
-fn logarithmic(range: &ParameterRange, place: f64) -> f64 {
-    let end = if place < 0.0 { range.min } else { range.max };
-    range.default * (end / range.default).powf(place.abs())
 }

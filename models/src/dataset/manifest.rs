@@ -7,6 +7,7 @@ use std::fmt;
 use std::path::Path;
 
 use retina_core::predict::indentation::EFFECTS;
+use retina_core::predict::sampled;
 use retina_core::predict::{MAX_DEPTH_SHARE, PUNCTURE_PRESSURE_PER_MODULUS};
 use retina_core::range::ParameterRange;
 use retina_core::scene::Scene;
@@ -14,6 +15,7 @@ use retina_core::tissue::ranges::{CHOROID, LayerRanges, RETINA, SCLERA};
 use serde::{Deserialize, Serialize};
 
 use super::blocks::{PathRecord, read_json, write_json};
+use super::draw::Depths;
 use super::error::DatasetError;
 use super::shards::ShardRecord;
 use super::{draw, path, truth};
@@ -37,6 +39,9 @@ pub struct Settings {
     pub truth: String,
     /// Version of this package.
     pub version: String,
+    /// How deep the paths go.
+    #[serde(default)]
+    pub depths: Depths,
 }
 
 /// Paths by how they ended.
@@ -90,7 +95,7 @@ pub struct Manifest {
 
 impl Settings {
     /// Settings of this program for `seed` and the scenes with these indices.
-    pub fn new(seed: u64, scenes: &[u8]) -> Self {
+    pub fn new(seed: u64, scenes: &[u8], depths: Depths) -> Self {
         let names = Scene::built_in_names();
         Settings {
             format: FORMAT,
@@ -98,6 +103,7 @@ impl Settings {
             scenes: scenes.iter().map(|&scene| names[usize::from(scene)].to_owned()).collect(),
             truth: truth::NAME.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
+            depths,
         }
     }
 
@@ -201,19 +207,20 @@ fn ranges() -> BTreeMap<String, Range> {
     let mut add = |name: &str, unit: &str, [from, to]: [f64; 2], default: Option<f64>| {
         ranges.insert(name.to_owned(), Range { unit: unit.to_owned(), from, to, default });
     };
-    add("needle.tilt", "deg", draw::TILT_DEG, None);
+    add("needle.tilt", "deg", sampled::TILT_DEG, None);
     add("needle.lean_of_direction", "deg", draw::LEAN_DEG, None);
     add("needle.touch_x_and_y", "mm", [-draw::REACH_MM, draw::REACH_MM], None);
     add("needle.clearance", "mm", draw::CLEARANCE_MM, None);
-    add("needle.edge_per_radius", "1", draw::EDGE_SHARE, Some(draw::EDGE_SHARE[0]));
-    add("needle.bevel", "deg", draw::BEVEL_DEG, None);
+    add("needle.edge_per_radius", "1", sampled::EDGE_SHARE, Some(sampled::EDGE_SHARE[0]));
+    add("needle.bevel", "deg", sampled::BEVEL_DEG, None);
     add("outside.tilt", "deg", draw::OUTSIDE_TILT_DEG, None);
     add("outside.lean_of_direction", "deg", draw::OUTSIDE_LEAN_DEG, None);
     add("depth.share_of_limit", "1", draw::DEEPEST_SHARE, None);
+    add("depth.light.share_of_limit", "1", draw::LIGHT_SHARE, None);
     add("limit.depth_per_retina_and_choroid", "1", [0.0, MAX_DEPTH_SHARE], None);
     add("limit.pressure_per_modulus", "1", [0.0, PUNCTURE_PRESSURE_PER_MODULUS], None);
     add("limit.newton_iterations", "1", [0.0, path::MOST_ITERATIONS as f64], None);
-    let radii = draw::gauge_radii_mm();
+    let radii = sampled::gauge_radii_mm();
     add("needle.radius", "mm", radii, None);
     add("outside.radius", "mm", [radii[1], draw::OUTSIDE_RADIUS_MM], None);
     let layers: [(&str, &LayerRanges); 3] = [("retina", &RETINA), ("choroid", &CHOROID), ("sclera", &SCLERA)];

@@ -13,6 +13,11 @@ fn length_um(vector: &[f32; 3]) -> f64 {
     1e3 * vector.iter().map(|&c| f64::from(c).powi(2)).sum::<f64>().sqrt()
 }
 
+/// Largest distance of a node between two fields (µm).
+pub fn distance_um(a: &Field, b: &Field) -> f64 {
+    a.iter().zip(b).map(|(a, b)| length_um(&std::array::from_fn(|k| a[k] - b[k]))).fold(0.0, f64::max)
+}
+
 /// Node distances of `answer` to the truth of many samples.
 #[derive(Default)]
 struct Errors {

@@ -13,7 +13,7 @@ use retina_core::predict::finite_element::Resolution;
 use retina_core::scene::Scene;
 
 use super::blocks::{BlockRecord, Blocks, PATHS_PER_BLOCK};
-use super::draw::plan;
+use super::draw::{Depths, plan};
 use super::error::DatasetError;
 use super::manifest::{Counts, FILE, Manifest, Settings};
 use super::part::Part;
@@ -33,6 +33,8 @@ pub struct Order {
     pub scene: String,
     /// How many paths.
     pub paths: u32,
+    /// How deep they go.
+    pub depths: Depths,
     /// The seed.
     pub seed: u64,
     /// Threads.
@@ -42,9 +44,9 @@ pub struct Order {
 }
 
 impl Order {
-    /// `paths` paths on `scene` from `seed` with `threads` threads.
+    /// `paths` deep paths on `scene` from `seed` with `threads` threads.
     pub fn new(scene: &str, paths: u32, seed: u64, threads: usize) -> Self {
-        Order { scene: scene.to_owned(), paths, seed, threads, resolution: truth::TRUTH }
+        Order { scene: scene.to_owned(), paths, depths: Depths::Deep, seed, threads, resolution: truth::TRUTH }
     }
 
     /// Indices of the scenes among the built-in names.
@@ -175,7 +177,7 @@ fn begin(order: &Order, folder: &FilePath) -> Result<(Vec<u8>, Settings, Blocks)
         }
     }
     std::fs::create_dir_all(folder).map_err(DatasetError::io(folder))?;
-    let settings = Settings::new(order.seed, &scenes);
+    let settings = Settings::new(order.seed, &scenes, order.depths);
     settings.check(folder)?;
     let manifest = folder.join(FILE);
     if !manifest.exists() {
@@ -251,7 +253,9 @@ impl<'a> Work<'a> {
 
     fn path(&self, path: u32, memory: &mut PathMemory) -> Result<PathOutcome, DatasetError> {
         let none = |cause| PathOutcome { samples: Vec::new(), ended_by: Some(cause), iterations: 0 };
-        let Some(plan) = plan(self.order.seed, path, self.scenes) else { return Ok(none(Cause::NoStart)) };
+        let Some(plan) = plan(self.order.seed, path, self.scenes, self.order.depths) else {
+            return Ok(none(Cause::NoStart));
+        };
         let own;
         let prepared = match plan.default_tissue {
             true => &self.prepared[usize::from(plan.scene_index)],

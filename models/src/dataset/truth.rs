@@ -9,7 +9,7 @@ use retina_core::needle::Tip;
 use retina_core::predict::finite_element::{REFERENCE, Resolution};
 use retina_core::predict::{PredictError, PreparedScene};
 
-use super::draw::{STEPS, plan};
+use super::draw::{Depths, STEPS, plan};
 use super::path::{Path, PathMemory};
 use super::report::largest_um;
 use crate::sample::Sample;
@@ -67,7 +67,7 @@ pub struct Comparison {
 /// If the path's scene cannot be prepared.
 pub fn compare(seed: u64, path: u32, scenes: &[u8]) -> Result<Vec<Comparison>, PredictError> {
     let mut comparisons = Vec::new();
-    let Some(plan) = plan(seed, path, scenes) else { return Ok(comparisons) };
+    let Some(plan) = plan(seed, path, scenes, Depths::Deep) else { return Ok(comparisons) };
     let prepared = PreparedScene::new(plan.scene.clone())?;
     let tip = match plan.needle.shape.tip {
         Tip::Hemispherical => 0,

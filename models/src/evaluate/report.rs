@@ -10,6 +10,7 @@ use retina_core::scene::Scene;
 use super::baselines::kelvinlet::Kelvinlet;
 use super::baselines::nearest::Nearest;
 use super::baselines::pod::Pod;
+use super::coverage::coverage;
 use super::errors::{Errors, Mesh, mean, published_mean, quantile};
 use super::predictors::{Coarse, Contact, Faithful, Linear, Predictor, Still};
 use super::tables::{self, Row};
@@ -20,7 +21,7 @@ use crate::sample::{Sample, Split};
 /// Gauges between whose radii the rows by needle lie (mm), with their names.
 const NEEDLES: [(&str, f32); 3] = [("41G to 30G", 0.1555), ("30G to 25G", 0.257), ("25G to 23G", 1.0)];
 /// Names of the tips.
-const TIPS: [&str; 3] = ["half balls", "flat tips", "bevels"];
+pub const TIPS: [&str; 3] = ["half balls", "flat tips", "bevels"];
 /// Batch of the published evaluation.
 const PUBLISHED_BATCH: usize = 4;
 
@@ -128,36 +129,6 @@ fn groups(predictors: &mut [Box<dyn Predictor>], samples: &[(&Sample, Input)], m
         })
         .collect();
     tables::by_group(&names, &groups)
-}
-
-/// How often the promised bounds hold, and whether the network knows that it does not know.
-fn coverage(networks: &mut [Contact], splits: &[(Split, Vec<(&Sample, Input)>)]) -> String {
-    let mut text = String::from(
-        "| network | split | below the median, % | below the 95 % bound, % | median bound µm | known to the network, % |\n|---|---|---|---|---|---|\n",
-    );
-    for network in networks {
-        for (split, samples) in splits {
-            let (mut below, mut bounds, mut known, mut count) = ([0.0; 2], Vec::new(), 0.0, 0.0);
-            for (sample, input) in samples {
-                let Some(answer) = network.answer(input) else { continue };
-                let off = answer.answer.displacement_mm.iter().zip(truth(sample)).map(|(a, t)| (a - t).norm());
-                let worst = off.fold(0.0, f32::max);
-                for (below, bound) in below.iter_mut().zip(answer.error_mm) {
-                    *below += f64::from(u8::from(worst <= bound));
-                }
-                bounds.push(f64::from(answer.error_mm[1]) * 1e3);
-                known += f64::from(u8::from(answer.known));
-                count += 1.0;
-            }
-            if count > 0.0 {
-                let [half, most] = below.map(|below| 100.0 * below / count);
-                let (name, bound, known) = (network.name(), quantile(&bounds, 0.5), 100.0 * known / count);
-                let _ =
-                    writeln!(text, "| {name} | {} | {half:.1} | {most:.1} | {bound:.2} | {known:.1} |", split.name());
-            }
-        }
-    }
-    text
 }
 
 /// Errors of travel and reaction, and the time that a prediction takes.

@@ -19,6 +19,9 @@ pub struct Config {
     /// Address and port to listen on; port 0 takes a free one.
     #[arg(long, env = "RETINA_LISTEN", default_value = "127.0.0.1:8080")]
     pub listen: SocketAddr,
+    /// Address and port on which OpenIGTLink clients (3D Slicer, PLUS) are served too; 18944 is their usual port.
+    #[arg(long, env = "RETINA_IGTL", value_name = "ADDRESS")]
+    pub igtl: Option<SocketAddr>,
     /// File of settings (TOML), each under its long name without the dashes in front: `threads = 4`.
     #[arg(long, env = "RETINA_CONFIG", value_name = "FILE")]
     pub config: Option<PathBuf>,

@@ -46,6 +46,8 @@ kinds! {
          their sources. Values are refused, never moved.";
     UnknownName = "unknown-name", UNPROCESSABLE_ENTITY, "There is nothing of that name",
         "A scene, gauge, level or effect that does not exist, or that the level cannot do. `errors` lists the known ones.";
+    Damaged = "damaged", BAD_REQUEST, "The message is damaged",
+        "A message of a binary protocol does not have the checksum or the sizes that its header tells. Send it again.";
     NotPossible = "not-possible", UNPROCESSABLE_ENTITY, "No level keeps what is promised",
         "`accuracy.strict` was asked for, and no level is expected to keep the error or the time. `detail` says by how much. Ask for less, or \
          without `strict` for the best there is.";

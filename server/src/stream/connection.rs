@@ -1,7 +1,7 @@
 //! One connection: what has come, what is at work and what is being sent.
 //!
-//! Contract: at most one message of each kind is held: an opening, the newest pose, a job, a message being sent; and some problems. While
-//! those problems fill their room nothing more is read, so a client that sends nonsense and reads nothing waits.
+//! Contract: at most one message of each kind is held: an opening, the newest pose, a job, a message being sent; and some remarks. While
+//! those remarks fill their room nothing more is read, so a client that sends nonsense and reads nothing waits.
 
 use std::collections::VecDeque;
 use std::future::{Future, pending};
@@ -9,89 +9,97 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
-use futures_util::{SinkExt as _, StreamExt as _};
+use futures_util::{Sink, SinkExt as _, Stream, StreamExt as _};
 use tokio::time::{interval_at, timeout};
 
-use super::binary;
-use super::session::{Open, Posed, Session, open, problem_text};
+use super::protocol::{Farewell, Form, Opening, Protocol, Taken};
+use super::session::{Posed, Session, open};
 use crate::admission;
 use crate::problem::{Kind, Problem};
-use crate::read::read;
 use crate::state::AppState;
 use crate::stopwatch::Stopwatch;
-use crate::wire::stream::{ProblemMessage, StreamCommand, StreamMessage, StreamPose};
+use crate::wire::stream::StreamPose;
 
-/// Longest message, bytes: a mesh of about ten thousand vertices.
-pub const LONGEST_MESSAGE: usize = 1 << 20;
-
-/// Texts up to this long are read by the thread that talks, bytes; longer ones can only open a session.
-const SHORT: usize = 4 << 10;
-
-/// Problems that may wait to be sent.
-const MOST_PROBLEMS: usize = 16;
+/// Remarks (problems, mostly) that may wait to be sent.
+const MOST_REMARKS: usize = 16;
 
 /// How long a farewell may take.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-type Sink = SplitSink<WebSocket, Message>;
-type Sending = Pin<Box<dyn Future<Output = Result<Sink, axum::Error>> + Send>>;
-type Work = Pin<Box<dyn Future<Output = Done> + Send>>;
+type FormOf<P> = <P as Protocol>::Form;
+type MessageOf<P> = <FormOf<P> as Form>::Message;
+type TagOf<P> = <FormOf<P> as Form>::Tag;
+type PosedOf<P> = Posed<TagOf<P>>;
+type Sending<S> = Pin<Box<dyn Future<Output = Result<S, ()>> + Send>>;
+type Work<F> = Pin<Box<dyn Future<Output = Done<F>> + Send>>;
+
+/// A transport: messages in and out, of one protocol.
+pub trait Transport<P: Protocol>:
+    Stream<Item = Result<P::Incoming, P::Fault>> + Sink<MessageOf<P>> + Send + 'static
+{
+}
+
+impl<P: Protocol, T> Transport<P> for T where
+    T: Stream<Item = Result<P::Incoming, P::Fault>> + Sink<MessageOf<P>> + Send + 'static
+{
+}
 
 /// What came of a job.
-enum Done {
-    Opened(Result<(Session, Message), Problem>),
-    Answered(Message),
+enum Done<F: Form> {
+    Opened(Result<(Session<F>, F::Message), Problem>),
+    Answered(F::Message),
     /// A pose has no answer.
-    Refused(Posed, u32, Problem),
+    Refused(Posed<F::Tag>, u32, Problem),
 }
 
 /// The way out.
-enum Outbox {
-    Idle(Sink),
-    Sending(Sending),
+enum Outbox<S> {
+    Idle(S),
+    Sending(Sending<S>),
     Broken,
 }
 
-struct Connection {
+struct Connection<P: Protocol, T: Transport<P>> {
+    protocol: P,
     app: AppState,
     began: Instant,
     heard: Instant,
-    session: Option<Arc<Session>>,
-    opening: Option<Open>,
-    newest: Option<Posed>,
+    session: Option<Arc<Session<FormOf<P>>>>,
+    opening: Option<Opening<FormOf<P>>>,
+    newest: Option<PosedOf<P>>,
     last_sequence: Option<u64>,
     dropped: u32,
-    problems: VecDeque<Message>,
-    ready: Option<Message>,
-    work: Option<Work>,
-    outbox: Outbox,
+    remarks: VecDeque<MessageOf<P>>,
+    ready: Option<MessageOf<P>>,
+    work: Option<Work<FormOf<P>>>,
+    outbox: Outbox<SplitSink<T, MessageOf<P>>>,
 }
 
-/// Serves one stream until its client goes or the service stops.
-pub async fn serve(socket: WebSocket, app: AppState) {
-    let (sink, stream) = socket.split();
+/// Serves one client until it goes or the service stops.
+pub async fn serve<P: Protocol, T: Transport<P>>(transport: T, mut protocol: P, app: AppState) {
+    let (sink, stream) = transport.split();
     let now = Instant::now();
-    let connection = Connection {
+    let connection = Connection::<P, T> {
         began: now,
         heard: now,
         session: None,
-        opening: None,
+        opening: protocol.begin(),
         newest: None,
         last_sequence: None,
         dropped: 0,
-        problems: VecDeque::new(),
+        remarks: VecDeque::new(),
         ready: None,
         work: None,
         outbox: Outbox::Idle(sink),
+        protocol,
         app,
     };
     connection.run(stream).await;
 }
 
-impl Connection {
-    async fn run(mut self, mut stream: SplitStream<WebSocket>) {
+impl<P: Protocol, T: Transport<P>> Connection<P, T> {
+    async fn run(mut self, mut stream: SplitStream<T>) {
         let idle = self.app.streams.idle;
         // A third of the time leaves a client two more occasions to show that it is there.
         let mut tick = interval_at(tokio::time::Instant::now() + idle / 3, idle / 3);
@@ -100,35 +108,39 @@ impl Connection {
         let farewell = loop {
             self.go_on(stopping);
             if stopping && self.work.is_none() && matches!(self.outbox, Outbox::Idle(_)) {
-                break Some((close_code::AWAY, "the service stops"));
+                break Some(Farewell::Stopping);
             }
             tokio::select! {
-                message = stream.next(), if self.problems.len() < MOST_PROBLEMS && !stopping => match message {
-                    Some(Ok(Message::Close(_))) | None => break None,
-                    Some(Ok(message)) => self.take(message),
-                    Some(Err(error)) => break too_long(&error),
+                message = stream.next(), if self.remarks.len() < MOST_REMARKS && !stopping => match message {
+                    Some(Ok(message)) => {
+                        if !self.take(message) {
+                            break None;
+                        }
+                    }
+                    Some(Err(fault)) => break Some(Farewell::Broken(fault)),
+                    None => break None,
                 },
                 done = finished(&mut self.work) => self.finish(done),
                 sent = sent(&mut self.outbox) => match sent {
                     Ok(sink) => self.outbox = Outbox::Idle(sink),
-                    Err(_) => break None,
+                    Err(()) => break None,
                 },
                 _ = tick.tick() => {
                     if self.heard.elapsed() >= idle {
                         tracing::debug!("a stream whose client is not heard of is closed");
-                        break None;
+                        break Some(Farewell::Silent);
                     }
-                    if matches!(self.outbox, Outbox::Idle(_)) {
-                        self.send(Message::Ping(Default::default()));
+                    if let (Outbox::Idle(_), Some(knock)) = (&self.outbox, self.protocol.knock()) {
+                        self.send(knock);
                     }
                 }
                 () = stop.cancelled(), if !stopping => stopping = true,
             }
         };
-        if let (Some((code, reason)), Outbox::Idle(mut sink)) = (farewell, self.outbox) {
-            let close = Message::Close(Some(CloseFrame { code, reason: reason.into() }));
+        let last = farewell.and_then(|why| self.protocol.farewell(why));
+        if let (Some(last), Outbox::Idle(mut sink)) = (last, self.outbox) {
             // The client may be gone already.
-            let _ = timeout(FAREWELL, sink.send(close)).await;
+            let _ = timeout(FAREWELL, sink.send(last)).await;
         }
     }
 
@@ -137,7 +149,7 @@ impl Connection {
         if !matches!(self.outbox, Outbox::Idle(_)) {
             return;
         }
-        if let Some(message) = self.ready.take().or_else(|| self.problems.pop_front()) {
+        if let Some(message) = self.ready.take().or_else(|| self.remarks.pop_front()) {
             return self.send(message);
         }
         if self.work.is_some() || stopping {
@@ -153,66 +165,57 @@ impl Connection {
                 }
                 None => {
                     let problem = Problem::new(Kind::InvalidRequest, "There is no session; send {\"open\": {}} first.");
-                    self.refuse(Some(&posed.pose), dropped, &problem);
+                    self.refuse(Some((&posed.pose, &posed.tag)), dropped, &problem);
                     self.go_on(stopping);
                 }
             }
         }
     }
 
-    fn send(&mut self, message: Message) {
+    fn send(&mut self, message: MessageOf<P>) {
         self.outbox = match std::mem::replace(&mut self.outbox, Outbox::Broken) {
-            Outbox::Idle(mut sink) => Outbox::Sending(Box::pin(async move { sink.send(message).await.map(|()| sink) })),
+            Outbox::Idle(mut sink) => Outbox::Sending(Box::pin(async move {
+                let sent = sink.send(message).await;
+                sent.map(|()| sink).map_err(drop)
+            })),
             busy => busy,
         };
     }
 
-    /// Takes in a message of the client.
-    fn take(&mut self, message: Message) {
+    /// Takes in a message of the client; false if it leaves.
+    fn take(&mut self, message: P::Incoming) -> bool {
         self.heard = Instant::now();
-        let command = match &message {
-            Message::Text(text) if text.len() > SHORT => {
-                self.begin_opening(Open::Text(text.clone()));
-                return;
+        match self.protocol.take(message) {
+            Taken::Nothing => {}
+            Taken::Open(opening) => {
+                // What the session before had not yet answered has no answer.
+                (self.session, self.newest, self.last_sequence, self.dropped) = (None, None, None, 0);
+                self.opening = Some(opening);
             }
-            Message::Text(text) => read::<StreamCommand>(text.as_bytes()),
-            Message::Binary(bytes) => binary::pose(bytes).map(|pose| StreamCommand { open: None, pose: Some(pose) }),
-            Message::Ping(_) | Message::Pong(_) | Message::Close(_) => return,
-        };
-        match command {
-            Ok(StreamCommand { open: Some(spec), pose: None }) => self.begin_opening(Open::Read(Box::new(spec))),
-            Ok(StreamCommand { open: None, pose: Some(pose) }) => self.take_pose(pose),
-            Ok(_) => {
-                let allowed = "exactly one of open, pose";
-                let detail = "a message has exactly one of the fields open and pose";
-                self.refuse(None, 0, &Problem::field(Kind::InvalidRequest, "", None, allowed, detail));
-            }
-            Err(problem) => self.refuse(None, 0, &problem),
+            Taken::Pose(pose, tag) => self.take_pose(pose, tag),
+            Taken::Say(message) => self.remarks.push_back(message),
+            Taken::Refused(problem) => self.refuse(None, 0, &problem),
+            Taken::Leave => return false,
         }
+        true
     }
 
-    fn begin_opening(&mut self, opening: Open) {
-        // What the session before had not yet answered has no answer.
-        (self.session, self.newest, self.last_sequence, self.dropped) = (None, None, None, 0);
-        self.opening = Some(opening);
-    }
-
-    fn take_pose(&mut self, pose: StreamPose) {
+    fn take_pose(&mut self, pose: StreamPose, tag: TagOf<P>) {
         if let Some(last) = self.last_sequence.filter(|last| pose.sequence <= *last) {
             let detail = format!("pose.sequence is {}, and that of the pose before was {last}", pose.sequence);
             let allowed = format!("more than {last}");
             let given = Some(pose.sequence.into());
             let problem = Problem::field(Kind::OutOfRange, "pose.sequence", given, allowed, detail);
-            return self.refuse(Some(&pose), 0, &problem);
+            return self.refuse(Some((&pose, &tag)), 0, &problem);
         }
         self.last_sequence = Some(pose.sequence);
-        let posed = Posed { pose, arrived: self.heard, received: self.heard - self.began };
+        let posed = Posed { pose, tag, arrived: self.heard, received: self.heard - self.began };
         if self.newest.replace(posed).is_some() {
             self.dropped += 1;
         }
     }
 
-    fn finish(&mut self, done: Done) {
+    fn finish(&mut self, done: Done<FormOf<P>>) {
         self.work = None;
         match done {
             // Another opening has come meanwhile, and takes its place.
@@ -223,24 +226,18 @@ impl Connection {
             }
             Done::Opened(Err(problem)) => self.refuse(None, 0, &problem),
             Done::Answered(message) => self.ready = Some(message),
-            Done::Refused(posed, dropped, problem) => self.refuse(Some(&posed.pose), dropped, &problem),
+            Done::Refused(posed, dropped, problem) => self.refuse(Some((&posed.pose, &posed.tag)), dropped, &problem),
         }
     }
 
-    fn refuse(&mut self, pose: Option<&StreamPose>, dropped: u32, problem: &Problem) {
+    fn refuse(&mut self, about: Option<(&StreamPose, &TagOf<P>)>, dropped: u32, problem: &Problem) {
         self.app.metrics.pose_refused(problem.kind, dropped);
-        let message = StreamMessage::Problem(ProblemMessage {
-            sequence: pose.map(|pose| pose.sequence),
-            client_time_us: pose.and_then(|pose| pose.client_time_us),
-            dropped,
-            problem: problem.document(),
-        });
-        self.problems.push_back(problem_text(&message));
+        self.remarks.push_back(self.protocol.problem(about, dropped, problem));
     }
 }
 
 /// The end of the job, if there is one.
-async fn finished(work: &mut Option<Work>) -> Done {
+async fn finished<F: Form>(work: &mut Option<Work<F>>) -> Done<F> {
     match work {
         Some(work) => work.await,
         None => pending().await,
@@ -248,20 +245,14 @@ async fn finished(work: &mut Option<Work>) -> Done {
 }
 
 /// The end of the sending, if something is sent.
-async fn sent(outbox: &mut Outbox) -> Result<Sink, axum::Error> {
+async fn sent<S>(outbox: &mut Outbox<S>) -> Result<S, ()> {
     match outbox {
         Outbox::Sending(sending) => sending.await,
         Outbox::Idle(_) | Outbox::Broken => pending().await,
     }
 }
 
-/// The farewell to a client whose message is too long; one that broke off hears none.
-fn too_long(error: &axum::Error) -> Option<(u16, &'static str)> {
-    let is_capacity = error.to_string().to_ascii_lowercase().contains("too long");
-    is_capacity.then_some((close_code::SIZE, "a message may have 1 MiB"))
-}
-
-fn open_on(app: AppState, opening: Open) -> Work {
+fn open_on<F: Form>(app: AppState, opening: Opening<F>) -> Work<F> {
     Box::pin(async move {
         let scenes = Arc::clone(&app.scenes);
         let job = move |_: &mut _, _: &dyn Fn() -> bool| open(opening, &scenes);
@@ -270,7 +261,7 @@ fn open_on(app: AppState, opening: Open) -> Work {
     })
 }
 
-fn answer_on(app: AppState, session: Arc<Session>, posed: Posed, dropped: u32) -> Work {
+fn answer_on<F: Form>(app: AppState, session: Arc<Session<F>>, posed: Posed<F::Tag>, dropped: u32) -> Work<F> {
     Box::pin(async move {
         let (times, metrics, asked) = (Arc::clone(&app.times), Arc::clone(&app.metrics), posed.clone());
         let (limit, ticket) = (app.time_limit, admission::of_budget(session.budget(), &times, app.longest_wait));

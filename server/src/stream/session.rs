@@ -3,74 +3,56 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use axum::extract::ws::{Message, Utf8Bytes};
 use retina_core::predict::budget::Budget;
 use retina_core::predict::{PreparedScene, Workspace};
 use retina_core::progress::Progress as _;
 
-use super::binary::{self, Head};
+use super::binary::Head;
+use super::protocol::{Form, Opening};
 use crate::answer::{Question, compute};
 use crate::metrics::Metrics;
-use crate::problem::{Kind, Problem, of_pose};
-use crate::read::read;
+use crate::problem::{Problem, of_pose};
 use crate::scenes::{Scenes, shared_triangles};
 use crate::stopwatch::Stopwatch;
 use crate::times::Times;
-use crate::understand::{self, Opening};
-use crate::wire::stream::{
-    AnswerMessage, Format, OpenSpec, OpenedMessage, StreamCommand, StreamMessage, StreamPose, StreamTimes,
-};
-use crate::write::{Layout, write};
+use crate::understand;
+use crate::wire::stream::{StreamPose, StreamTimes};
 
 /// A session: what holds for every pose.
-pub struct Session {
+pub struct Session<F> {
     scene: Arc<PreparedScene>,
-    opening: Opening,
-    format: Format,
+    opening: understand::Opening,
+    form: F,
 }
 
 /// A pose with what belongs to its place in the stream.
 #[derive(Clone, Debug)]
-pub struct Posed {
+pub struct Posed<T> {
     /// The pose.
     pub pose: StreamPose,
+    /// What the answer repeats besides.
+    pub tag: T,
     /// When it arrived.
     pub arrived: Instant,
     /// From the beginning of the connection until then.
     pub received: Duration,
 }
 
-/// The message that opens a session, read or not.
-pub enum Open {
-    /// Read.
-    Read(Box<OpenSpec>),
-    /// Too long to be read by the thread that talks.
-    Text(Utf8Bytes),
-}
-
 /// Opens a session: finds or prepares its scene.
 ///
 /// # Errors
 /// The problem that the client is told of.
-pub fn open(open: Open, scenes: &Scenes) -> Result<(Session, Message), Problem> {
-    let spec = match open {
-        Open::Read(spec) => spec,
-        Open::Text(text) => match read::<StreamCommand>(text.as_bytes())? {
-            StreamCommand { open: Some(spec), pose: None } => Box::new(spec),
-            _ => return Err(Problem::new(Kind::BodyTooLarge, "Only a message that opens a session may be so long.")),
-        },
-    };
+pub fn open<F: Form>(opening: Opening<F>, scenes: &Scenes) -> Result<(Session<F>, F::Message), Problem> {
+    let (spec, form) = opening()?;
     let within = |problem: Problem| problem.within("open");
     let opening = understand::opening(&spec).map_err(within)?;
     // The scene's own problems begin with `scene`.
     let scene = scenes.get(spec.scene.as_ref()).map_err(within)?;
-    let triangles = shared_triangles(&scene)?;
-    let opened = OpenedMessage { protocol: binary::VERSION, format: spec.format, triangles: &triangles };
-    let message = text(&StreamMessage::Opened(opened))?;
-    Ok((Session { scene, opening, format: spec.format }, message))
+    let message = form.opened(&spec, &shared_triangles(&scene)?)?;
+    Ok((Session { scene, opening, form }, message))
 }
 
-impl Session {
+impl<F: Form> Session<F> {
     /// What every answer must keep.
     pub fn budget(&self) -> &Budget {
         &self.opening.shared.budget
@@ -82,12 +64,12 @@ impl Session {
     /// The problem that the client is told of.
     pub fn answer(
         &self,
-        posed: &Posed,
+        posed: &Posed<F::Tag>,
         dropped: u32,
         (times, metrics): (&Times, &Metrics),
         workspace: &mut Workspace,
         stopwatch: &mut Stopwatch,
-    ) -> Result<Message, Problem> {
+    ) -> Result<F::Message, Problem> {
         let waited = stopwatch.elapsed();
         let request = understand::pose(&self.opening, &posed.pose).map_err(of_pose)?;
         stopwatch.stage("prepare");
@@ -101,33 +83,6 @@ impl Session {
             computed: micros(posed.arrived.elapsed().saturating_sub(waited)),
         };
         let StreamPose { sequence, client_time_us, .. } = posed.pose;
-        match self.format {
-            Format::Json => text(&StreamMessage::Answer(Box::new(AnswerMessage {
-                sequence,
-                client_time_us,
-                dropped,
-                time_us: times,
-                prediction: (&prediction).into(),
-            }))),
-            Format::Binary => {
-                let head = Head { sequence, client_time_us, dropped, times };
-                binary::answer(&head, &prediction).map(|bytes| Message::Binary(bytes.into()))
-            }
-        }
+        self.form.answer(&Head { sequence, client_time_us, dropped, times }, &posed.tag, &prediction)
     }
-}
-
-/// The text message that says this.
-///
-/// # Errors
-/// [`Kind::Internal`] for a number that is not finite.
-pub fn text(message: &StreamMessage) -> Result<Message, Problem> {
-    let bytes = write(message, Layout::Compact).map_err(Problem::internal)?;
-    let text = String::from_utf8(bytes).map_err(Problem::internal)?;
-    Ok(Message::Text(text.into()))
-}
-
-/// The text message of a problem, which may repeat a `null` that the client wrote.
-pub fn problem_text(message: &StreamMessage) -> Message {
-    Message::Text(serde_json::to_string(message).unwrap_or_default().into())
 }

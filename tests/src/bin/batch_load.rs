@@ -1,16 +1,11 @@
 //! How many predictions a second batches give: `cargo run --release -p retina-tests --bin batch_load [-- BATCHES POSES LEVEL]` (20 batches of 1000
 //! poses, `linear`). One after the other on loopback, the service in this process as the program runs it.
 
-use std::net::SocketAddr;
-use std::sync::mpsc::Sender;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use clap::Parser as _;
 use retina_core::comparison::quantile;
-use retina_server::config::CommandLine;
-use retina_server::{App, run};
+use retina_tests::local_service;
 use serde_json::json;
-use tokio_util::sync::CancellationToken;
 
 /// Most batches, and most poses of one: what the service allows by default.
 const MOST: (usize, usize) = (1000, 1024);
@@ -22,9 +17,7 @@ fn main() {
     let batches: usize = argument(1, "20").parse::<usize>().expect("BATCHES").clamp(1, MOST.0);
     let poses: usize = argument(2, "1000").parse::<usize>().expect("POSES").clamp(1, MOST.1);
     let level = argument(3, "linear");
-    let (sender, receiver) = std::sync::mpsc::channel();
-    std::thread::spawn(move || serve(&sender));
-    let address = receiver.recv().expect("address");
+    let address = local_service::start(&[]).expect("service");
     let agent = ureq::Agent::new_with_defaults();
     let pose = |index: usize| {
         let x = 0.3 * (index as f64 * 0.618).fract() - 0.15;
@@ -46,19 +39,4 @@ fn main() {
     let at = |share: f64| quantile(&rates, share);
     println!("{level}, {batches} batches of {poses} poses, one after the other");
     println!("predictions a second: median {:.0}, p10 {:.0}, p90 {:.0}", at(0.5), at(0.1), at(0.9));
-}
-
-/// The service as the program runs it: one thread that talks, one for each core that computes.
-fn serve(bound: &Sender<SocketAddr>) {
-    let config = CommandLine::parse_from(["retina-server"]).config;
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("runtime");
-    runtime.block_on(async {
-        let service = App::start(&config).expect("threads");
-        while service.ready().is_err() {
-            tokio::time::sleep(Duration::from_millis(10)).await;
-        }
-        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.expect("port");
-        bound.send(listener.local_addr().expect("address")).expect("main thread");
-        run(listener, service, CancellationToken::new()).await.expect("service");
-    });
 }

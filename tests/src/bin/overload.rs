@@ -1,15 +1,10 @@
 //! What a service does at three times its capacity: `cargo run --release -p retina-tests --bin overload [-- TURNS SECONDS MAX_WAIT_MS]` (3
 //! turns of 3 seconds each for capacity and overload, 100 ms). Level `coarse`, one numerical thread, service and clients in one process.
 
-use std::net::SocketAddr;
-use std::sync::mpsc::Sender;
 use std::time::Duration;
 
-use clap::Parser as _;
-use retina_server::config::CommandLine;
-use retina_server::{App, run};
+use retina_tests::local_service;
 use retina_tests::overload::{Plan, measure, median};
-use tokio_util::sync::CancellationToken;
 
 /// Most turns, and the longest (s).
 const MOST: (usize, f64) = (20, 30.0);
@@ -19,10 +14,7 @@ fn main() {
     let turns: usize = argument(1, "3").parse::<usize>().expect("TURNS").clamp(1, MOST.0);
     let seconds: f64 = argument(2, "3").parse::<f64>().expect("SECONDS").clamp(0.5, MOST.1);
     let max_wait = argument(3, "100");
-    let (sender, receiver) = std::sync::mpsc::channel();
-    let words = ["retina-server", "--threads", "1", "--max-wait-ms", &max_wait].map(str::to_owned);
-    std::thread::spawn(move || serve(&sender, &words));
-    let address = receiver.recv().expect("address");
+    let address = local_service::start(&["--threads", "1", "--max-wait-ms", &max_wait]).expect("service");
     let turn = Duration::from_secs_f64(seconds);
     let turns = measure(&Plan { address, turn, turns, times_capacity: 3.0, clients: 48 });
     println!(
@@ -50,19 +42,4 @@ fn main() {
     let share = median(&turns, |turn| turn.goodput / turn.capacity);
     let useful = median(&turns, |turn| turn.useful / turn.calm_useful);
     println!("medians: {share:.2} of the capacity in answers, {useful:.2} in the thread's time");
-}
-
-/// The service as the program runs it: one thread that talks.
-fn serve(bound: &Sender<SocketAddr>, words: &[String]) {
-    let config = CommandLine::parse_from(words).config;
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("runtime");
-    runtime.block_on(async {
-        let service = App::start(&config).expect("threads");
-        while service.ready().is_err() {
-            tokio::time::sleep(Duration::from_millis(10)).await;
-        }
-        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.expect("port");
-        bound.send(listener.local_addr().expect("address")).expect("main thread");
-        run(listener, service, CancellationToken::new()).await.expect("service");
-    });
 }

@@ -4,19 +4,15 @@
 //! One connection on loopback, the service in this process as the program runs it. One thread of the client sends a pose whenever it is due,
 //! whatever has come back; another reads. The time of an answer is from just before its pose was sent until it was read.
 
-use std::net::{SocketAddr, TcpStream};
-use std::sync::mpsc::Sender;
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use clap::Parser as _;
 use retina_core::comparison::quantile;
-use retina_server::config::CommandLine;
-use retina_server::{App, run};
+use retina_tests::local_service;
 use retina_tests::stream_client::{decode, encode_pose};
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::protocol::Role;
 use tokio_tungstenite::tungstenite::{Message, WebSocket, client};
-use tokio_util::sync::CancellationToken;
 
 /// Longest run, so that no argument makes one without end (s).
 const LONGEST_S: f64 = 60.0;
@@ -41,9 +37,7 @@ fn main() {
     let rate: f64 = argument(1, "1000").parse::<f64>().expect("RATE").clamp(1.0, FASTEST);
     let seconds: f64 = argument(2, "10").parse::<f64>().expect("SECONDS").clamp(0.1, LONGEST_S);
     let (level, format) = (argument(3, "linear"), argument(4, "binary"));
-    let (sender, receiver) = std::sync::mpsc::channel();
-    std::thread::spawn(move || serve(&sender));
-    let address = receiver.recv().expect("address");
+    let address = local_service::start(&[]).expect("service");
 
     let stream = TcpStream::connect(address).expect("connection");
     stream.set_nodelay(true).expect("nodelay");
@@ -78,21 +72,6 @@ fn main() {
     );
     let kept = per_second >= 0.99 * GOAL.0 && at(0.99) <= GOAL.1;
     println!("1000 a second with p99 of 2 ms or less: {}", if kept { "kept" } else { "not kept" });
-}
-
-/// The service as the program runs it: one thread that talks, one for each core that computes.
-fn serve(bound: &Sender<SocketAddr>) {
-    let config = CommandLine::parse_from(["retina-server"]).config;
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("runtime");
-    runtime.block_on(async {
-        let service = App::start(&config).expect("threads");
-        while service.ready().is_err() {
-            tokio::time::sleep(Duration::from_millis(10)).await;
-        }
-        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.expect("port");
-        bound.send(listener.local_addr().expect("address")).expect("main thread");
-        run(listener, service, CancellationToken::new()).await.expect("service");
-    });
 }
 
 fn send(mut socket: WebSocket<TcpStream>, began: Instant, rate: f64, count: u64) {

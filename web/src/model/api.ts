@@ -1,6 +1,7 @@
 /** The only file that talks to the server. */
 
 import type {
+  CostTable,
   GaugeList,
   LevelList,
   PredictRequest,
@@ -19,6 +20,8 @@ export interface Catalog {
   scenes: SceneList;
   levels: LevelList;
   gauges: GaugeList;
+  /** What accuracy costs in time; a server without measurements has none. */
+  costs: CostTable | undefined;
   /** Fields of `accuracy` that the server describes. */
   accuracyFields: string[];
 }
@@ -49,14 +52,15 @@ export async function predict(request: PredictRequest, signal: AbortSignal): Pro
 
 /** Everything there is to choose from; throws when the server is gone. */
 export async function catalog(): Promise<Catalog> {
-  const [scenes, levels, gauges, description] = await Promise.all([
+  const [scenes, levels, gauges, costs, description] = await Promise.all([
     get<SceneList>("/v1/scenes"),
     get<LevelList>("/v1/levels"),
     get<GaugeList>("/v1/gauges"),
+    get<CostTable>("/v1/accuracy").catch(() => undefined),
     get<Description>("/openapi.json"),
   ]);
   const properties = description.components.schemas.AccuracySpec?.properties ?? {};
-  return { scenes, levels, gauges, accuracyFields: Object.keys(properties) };
+  return { scenes, levels, gauges, costs, accuracyFields: Object.keys(properties) };
 }
 
 /** Whether the server is there. */

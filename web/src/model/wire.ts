@@ -82,6 +82,33 @@ export interface GaugeList {
   gauges: { name: string; outer_diameter_mm: number; source: string }[];
 }
 
+/** A level or a setting, measured: the error of a request's worst node and the time of an answer. */
+export interface CostStanding {
+  name: string;
+  knob: string;
+  failed: number;
+  median_um: number;
+  p99_um: number;
+  median_ms: number;
+  p99_ms: number;
+}
+
+/** Requests of one kind. */
+export interface CostPanel {
+  panel: string;
+  caption: string;
+  requests: number;
+  floor_um: number;
+  reference: CostStanding;
+  standings: CostStanding[];
+}
+
+/** What accuracy costs in time. */
+export interface CostTable {
+  circumstances: { processor: string; version: string };
+  panels: CostPanel[];
+}
+
 /** An RFC 9457 problem document. */
 export interface Problem {
   type: string;

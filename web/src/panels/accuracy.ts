@@ -7,6 +7,7 @@ import { statistics } from "../model/statistics";
 import type { Accuracy } from "../model/wire";
 import type { Page } from "../page";
 import { Choice } from "./choice";
+import { CostChart } from "./cost_chart";
 import { button, element, panel, setText } from "./dom";
 import { comparisonTable } from "./comparison_table";
 import { perFrame } from "../per_frame";
@@ -49,12 +50,13 @@ export function accuracyPanel({ settings, session, compare, complaints }: Page):
   complaints.register(level, "accuracy", "accuracy.level");
   complaints.register(error, "accuracy.max_error_um");
   complaints.register(time, "accuracy.max_time_ms");
+  const chart = new CostChart(choose);
   const facts = element("dl", { class: "facts" });
   const start = button("Compare with reference", () => void compare.run());
   start.id = "compare";
   const table = element("div");
   const note = element("p", { class: "note", hidden: true }, "* not listed by this server");
-  body.append(kind.root, note, level.root, error.root, time.root, facts, start, table);
+  body.append(kind.root, note, level.root, error.root, time.root, chart.root, facts, start, table);
 
   const show = (): void => {
     const { accuracy } = settings.get();
@@ -68,7 +70,10 @@ export function accuracyPanel({ settings, session, compare, complaints }: Page):
     error.root.hidden = now !== "max_error_um";
     time.root.hidden = now !== "max_time_ms";
   };
-  const tell = perFrame(() => showFacts(facts, session.get()));
+  const tell = perFrame(() => {
+    showFacts(facts, session.get());
+    chart.show({ settings: settings.get(), session: session.get() });
+  });
   session.follow((now, before) => {
     const { catalog } = now;
     if (catalog && (catalog !== before.catalog || level.root.querySelector("input") === null)) {
@@ -104,7 +109,10 @@ export function accuracyPanel({ settings, session, compare, complaints }: Page):
       table.replaceChildren(...comparisonTable(now));
     }
   });
-  settings.follow(show);
+  settings.follow(() => {
+    show();
+    tell();
+  });
 }
 
 function showFacts(list: HTMLElement, session: Session): void {
