@@ -9,6 +9,7 @@ pub mod height_field;
 pub mod mesh_file;
 mod obj;
 mod ply;
+mod stl;
 pub mod triangle_mesh;
 
 use nalgebra::{Point3, Unit, Vector3};

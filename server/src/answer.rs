@@ -2,6 +2,7 @@
 //!
 //! The same function answers over HTTP and on the command line.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use retina_core::predict::budget::{Budget, DEFAULT_LEVEL};
@@ -18,10 +19,11 @@ use crate::wire::{PredictRequest, PredictResponse};
 use crate::write::{Layout, write};
 
 /// An answer with what led to it.
-#[derive(Debug)]
 pub struct Answer {
     /// The response.
     pub bytes: Vec<u8>,
+    /// The scene that it is about.
+    pub scene: Arc<PreparedScene>,
     /// The question as it was understood.
     pub request: Request,
     /// What the core said.
@@ -62,7 +64,7 @@ pub struct Question<'a> {
 /// # Errors
 /// The problem that the caller is told of.
 pub fn predict(
-    scene: &PreparedScene,
+    scene: &Arc<PreparedScene>,
     question: Question,
     workspace: &mut Workspace,
     stopwatch: &mut Stopwatch,
@@ -71,7 +73,7 @@ pub fn predict(
     let (request, prediction) = compute(scene, question, workspace, stopwatch)?;
     let response = PredictResponse::new(&prediction, stopwatch.finish());
     let bytes = write(&response, layout).map_err(Problem::internal)?;
-    Ok(Answer { bytes, request, prediction })
+    Ok(Answer { bytes, scene: Arc::clone(scene), request, prediction })
 }
 
 /// As [`predict`], without writing it down: the request with the level chosen, and what the core says.

@@ -149,7 +149,7 @@ impl Batch {
             let question = Question { request, budget: self.shared.budget, times };
             let (request, prediction) =
                 compute(&self.scene, question, workspace, stopwatch).map_err(|problem| at(index, problem))?;
-            metrics.predicted(request.level, stopwatch.finish());
+            metrics.predicted(&self.scene, &request, &prediction, stopwatch.finish());
             write(&BatchAnswer::Prediction(Box::new((&prediction).into())), Layout::Compact).map_err(Problem::internal)
         });
         // A problem may repeat a `null` that the client wrote, which an answer never has.

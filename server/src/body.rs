@@ -40,6 +40,13 @@ pub struct Received {
     _large: Option<OwnedSemaphorePermit>,
 }
 
+impl Received {
+    /// The bytes by themselves, cheap to share.
+    pub fn bytes(&self) -> Bytes {
+        self.bytes.clone()
+    }
+}
+
 impl AsRef<[u8]> for Received {
     fn as_ref(&self) -> &[u8] {
         &self.bytes
@@ -55,13 +62,27 @@ impl Bodies {
     /// The body of a request that announces JSON.
     ///
     /// # Errors
+    /// [`Kind::UnsupportedMediaType`], and those of [`Bodies::of_type`].
+    pub async fn json(&self, headers: &HeaderMap, body: Body) -> Result<Received, Problem> {
+        self.of_type(headers, body, is_json, "application/json").await
+    }
+
+    /// The body of a request that announces what `fits`; `wanted` says it in words.
+    ///
+    /// # Errors
     /// [`Kind::UnsupportedMediaType`], [`Kind::BodyTooLarge`], [`Kind::RequestTimeout`], [`Kind::Busy`] for a large body too many, or
     /// [`Kind::MalformedJson`] for one that breaks off.
-    pub async fn json(&self, headers: &HeaderMap, body: Body) -> Result<Received, Problem> {
+    pub async fn of_type(
+        &self,
+        headers: &HeaderMap,
+        body: Body,
+        fits: fn(&str) -> bool,
+        wanted: &str,
+    ) -> Result<Received, Problem> {
         let given = headers.get(header::CONTENT_TYPE);
-        if !given.is_some_and(|value| value.to_str().is_ok_and(is_json)) {
+        if !given.is_some_and(|value| value.to_str().is_ok_and(fits)) {
             let given = given.map_or("none".into(), |value| String::from_utf8_lossy(value.as_bytes()));
-            let detail = format!("The request's Content-Type is {given}; it must be application/json.");
+            let detail = format!("The request's Content-Type is {given}; it must be {wanted}.");
             return Err(Problem::new(Kind::UnsupportedMediaType, detail));
         }
         self.any(body).await
@@ -83,7 +104,7 @@ impl Bodies {
 }
 
 /// `application/json` or `application/…+json`, with or without parameters.
-fn is_json(media_type: &str) -> bool {
+pub fn is_json(media_type: &str) -> bool {
     let essence = media_type.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
     essence == "application/json" || (essence.starts_with("application/") && essence.ends_with("+json"))
 }

@@ -9,6 +9,7 @@ use retina_core::needle::{GAUGES, TIP_COORDINATE};
 use retina_core::patch::{NODES_PER_SIDE, SPACING_MM};
 use retina_core::predict::Level;
 use retina_core::predict::budget::DEFAULT_LEVEL;
+use retina_core::predict::networks::Networks;
 use retina_core::range::ParameterRange;
 use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
 use retina_core::scene::puncture::{MAX_FORCE, MAX_STRAIN, PRESSURE_PER_MODULUS, Puncture, PunctureForce};
@@ -26,20 +27,24 @@ use crate::config::Config;
 use crate::stream::LONGEST_MESSAGE;
 use crate::understand::{DEFAULT_GAUGE, DEFAULT_SCENE, FORCE, MAX_ERROR, MAX_TIME};
 use crate::wire::catalog::{
-    About, AboutLimits, GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry, SceneList,
+    About, AboutLimits, GaugeEntry, GaugeList, LevelEntry, LevelList, ParameterEntry, PatchEntry, SceneEntry,
+    SceneList, WeightsEntry,
 };
 use crate::wire::cost::CostTable;
 use crate::wire::scene::{
     BondSpec, LayerSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec,
     TissueSpec,
 };
+use crate::wire::stored::{StoreEntry, StoredScene};
 
-/// The built-in scenes, and every parameter with its range.
-pub fn scenes() -> SceneList {
+/// The built-in scenes, those that are stored, and every parameter with its range.
+pub fn scenes((stored, store): (Vec<StoredScene>, StoreEntry)) -> SceneList {
     let entry = |&name: &&'static str| Some(SceneEntry { name, scene: spec(&Scene::built_in(name)?) });
     SceneList {
         default: DEFAULT_SCENE,
         scenes: Scene::built_in_names().iter().filter_map(entry).collect(),
+        stored,
+        store,
         patch: PatchEntry {
             nodes_per_side: NODES_PER_SIDE,
             spacing_mm: SPACING_MM,
@@ -94,8 +99,9 @@ pub fn about(config: &Config) -> About {
         name: env!("CARGO_PKG_NAME"),
         version: env!("CARGO_PKG_VERSION"),
         commit: option_env!("RETINA_COMMIT"),
-        features: if cfg!(feature = "rerun") { vec!["rerun"] } else { Vec::new() },
+        features: features(),
         levels: Level::ALL.map(Level::name).into(),
+        weights: weights(),
         effects: EFFECT_NAMES.into(),
         limits: AboutLimits {
             threads: config.threads(),
@@ -113,18 +119,25 @@ pub fn about(config: &Config) -> About {
     }
 }
 
-/// A scene as a request would write it out.
-pub fn spec(scene: &Scene) -> SceneSpec {
-    let mut surface = SurfaceSpec {
-        kind: SurfaceKind::Flat,
-        radius_mm: None,
-        depth_mm: None,
-        sigma_mm: None,
-        vertices_mm: None,
-        triangles: None,
-        obj: None,
-        ply: None,
+fn weights() -> Vec<WeightsEntry> {
+    let shipped = Networks::shipped();
+    let entry = |(level, sha256): (Level, String)| WeightsEntry {
+        level: level.name(),
+        sha256,
+        usable: shipped.of(level).is_ok(),
     };
+    Networks::shipped_hashes().map(entry).into()
+}
+
+/// Cargo features of this program.
+fn features() -> Vec<&'static str> {
+    let all = [("otlp", cfg!(feature = "otlp")), ("rerun", cfg!(feature = "rerun")), ("s3", cfg!(feature = "s3"))];
+    all.into_iter().filter(|(_, built)| *built).map(|(name, _)| name).collect()
+}
+
+/// A scene as a request would write it out, but for the vertices and triangles of a mesh and for where the patch stands.
+pub fn spec(scene: &Scene) -> SceneSpec {
+    let mut surface = SurfaceSpec::of_kind(SurfaceKind::Flat);
     match scene.surface {
         SceneSurface::Flat => {}
         SceneSurface::Sphere { radius_mm } => {

@@ -6,7 +6,7 @@
 
 use std::fs;
 use std::future::pending;
-use std::io::{self, IsTerminal as _, Read, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -17,11 +17,13 @@ use retina_core::progress::Progress as _;
 use retina_core::scene::{Scene, SceneSurface};
 use retina_core::surface::mesh_file::{MeshFormat, read_mesh};
 use tokio_util::sync::CancellationToken;
-use tracing_subscriber::EnvFilter;
 
 use crate::answer::{Question, predict};
+#[cfg(feature = "rerun")]
+use crate::config::LogForm;
 use crate::config::table;
-use crate::config::{Command, CommandLine, Config, LogForm, PredictArgs, ReviewArgs, SimulateArgs};
+use crate::config::{Command, CommandLine, Config, PredictArgs, ReviewArgs, SimulateArgs};
+use crate::log;
 use crate::problem::{Kind, Problem, from_predict};
 use crate::read::read;
 use crate::recording::{self, Recorder, Totals};
@@ -79,7 +81,13 @@ pub fn main() -> ExitCode {
 }
 
 fn serve(config: &Config) -> ExitCode {
-    start_log(config.log);
+    let export = match log::start(config.log, config.otlp_endpoint.as_deref()) {
+        Ok(export) => export,
+        Err(error) => {
+            tracing::error!(%error, "not started");
+            return ExitCode::from(COMMAND_LINE_AT_FAULT);
+        }
+    };
     let recorder = match config.recording().map(|destination| recording::start(&destination)).transpose() {
         Ok(recorder) => recorder,
         Err(error) => {
@@ -92,6 +100,7 @@ fn serve(config: &Config) -> ExitCode {
         let Totals { written, dropped, failed, closed } = recorder.finish(RECORDING_PATIENCE);
         tracing::info!(written, dropped, failed, complete = closed, "the recording ended");
     }
+    drop(export);
     match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -153,7 +162,8 @@ async fn told_to_stop() {
 
 #[cfg(feature = "rerun")]
 fn review(args: &ReviewArgs) -> ExitCode {
-    start_log(LogForm::Pretty);
+    // Nothing is exported, so nothing fails.
+    let _ = log::start(LogForm::Pretty, None);
     crate::review::main(args)
 }
 
@@ -161,15 +171,6 @@ fn review(args: &ReviewArgs) -> ExitCode {
 fn review(_args: &ReviewArgs) -> ExitCode {
     eprintln!("retina-server review: {}", recording::RecordingError::NotBuilt);
     ExitCode::from(COMMAND_LINE_AT_FAULT)
-}
-
-fn start_log(form: LogForm) {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
-    let log = tracing_subscriber::fmt().with_writer(io::stderr).with_env_filter(filter);
-    match form {
-        LogForm::Pretty => log.with_ansi(io::stderr().is_terminal()).init(),
-        LogForm::Json => log.json().init(),
-    }
 }
 
 /// `retina-server predict`; returns the exit code.
@@ -260,7 +261,7 @@ fn answer(body: &[u8], mesh: Option<&Path>, layout: Layout) -> Result<Vec<u8>, P
         replace_surface(&mut scene, path)?;
     }
     stopwatch.stage("prepare");
-    let scene = PreparedScene::new(scene).map_err(from_predict)?;
+    let scene = Arc::new(PreparedScene::new(scene).map_err(from_predict)?);
     let question = Question { request, budget, times: &Times::default() };
     predict(&scene, question, &mut Workspace::default(), &mut stopwatch, layout).map(|answer| answer.bytes)
 }
@@ -270,13 +271,8 @@ fn replace_surface(scene: &mut Scene, path: &Path) -> Result<(), Problem> {
         let detail = format!("{}: {reason}", path.display());
         Problem::field(Kind::InvalidMesh, "--mesh", None, allowed, detail)
     };
-    let format = match path.extension().and_then(|extension| extension.to_str()) {
-        Some("ply") => MeshFormat::Ply,
-        Some("obj") => MeshFormat::Obj,
-        _ => {
-            return Err(refuse("a file named .ply or .obj", "unknown format".to_owned()));
-        }
-    };
+    let format = path.file_name().and_then(|name| name.to_str()).and_then(MeshFormat::of_name);
+    let format = format.ok_or_else(|| refuse("a file named .ply, .obj or .stl", "unknown format".to_owned()))?;
     let bytes = fs::read(path).map_err(|error| refuse("a file that can be read", error.to_string()))?;
     let mesh = read_mesh(&bytes, format)
         .map_err(|error| refuse("a triangle mesh in mm with a common outward side", error.to_string()))?;

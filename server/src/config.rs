@@ -49,7 +49,7 @@ pub enum Command {
 pub struct PredictArgs {
     /// File with the request that `POST /v1/predict` takes; `-` is standard input.
     pub request: PathBuf,
-    /// A mesh in mm (.ply, text or binary, or .obj) in place of the scene's surface.
+    /// A mesh in mm (.ply or .stl, text or binary, or .obj) in place of the scene's surface.
     #[arg(long)]
     pub mesh: Option<PathBuf>,
     /// One line for each field.
@@ -130,7 +130,7 @@ impl ReviewDestination {
 pub struct SimulateArgs {
     /// File with the request that `POST /v1/simulate` takes; `-` is standard input.
     pub request: PathBuf,
-    /// A mesh in mm (.ply, text or binary, or .obj) in place of the scene's surface.
+    /// A mesh in mm (.ply or .stl, text or binary, or .obj) in place of the scene's surface.
     #[arg(long)]
     pub mesh: Option<PathBuf>,
 }

@@ -1,5 +1,7 @@
 //! What each route does. The URLs stand in `routes`; the work is done elsewhere.
 
+mod stored;
+
 use axum::Json;
 use axum::body::Body;
 use axum::extract::rejection::PathRejection;
@@ -11,13 +13,15 @@ use axum::response::{IntoResponse, Response};
 
 use prometheus_client::metrics::counter::Counter;
 
+pub use stored::*;
+
 use crate::catalog;
 use crate::metrics;
 use crate::problem::{Kind, MEDIA_TYPE, Problem, ProblemDocument};
 use crate::state::AppState;
 use crate::wire::{
     About, BatchRequest, BatchResponse, CostTable, GaugeList, LevelList, PredictRequest, PredictResponse, Readiness,
-    SceneList, SimulateLine, SimulateRequest,
+    SimulateLine, SimulateRequest,
 };
 
 /// What the surface looks like when a needle at this pose pushes with this force.
@@ -115,12 +119,6 @@ pub async fn stream(
 ) -> Result<Response, Problem> {
     let upgrade = upgrade.map_err(|rejection| Problem::new(Kind::UpgradeRequired, rejection.body_text()))?;
     app.stream(&headers, upgrade)
-}
-
-/// The built-in scenes, and every parameter of a scene with its default, range and source.
-#[utoipa::path(get, path = "/v1/scenes", tag = "catalog", responses((status = 200, body = SceneList)))]
-pub async fn scenes() -> Json<SceneList> {
-    Json(catalog::scenes())
 }
 
 /// The levels of accuracy, cheapest first.

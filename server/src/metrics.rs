@@ -4,7 +4,7 @@
 //! whatever is asked. Every service has its own registry.
 
 use std::fmt::Error;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use axum::extract::{MatchedPath, Request, State};
@@ -17,8 +17,10 @@ use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::{Histogram, exponential_buckets};
 use prometheus_client::registry::{Registry, Unit};
-use retina_core::predict::Level;
+use retina_core::predict::{Prediction, PreparedScene, Request as Question};
 
+use crate::audit::Audit;
+use crate::audit::metrics::AuditMetrics;
 use crate::pool::Load;
 use crate::problem::Kind;
 
@@ -70,6 +72,10 @@ pub struct Metrics {
     pub streams: Gauge,
     /// Panics, contained.
     pub panics: Counter,
+    /// What the audit counts.
+    pub audit_metrics: AuditMetrics,
+    /// What audits a sample of the answers, where anything does.
+    pub audit: OnceLock<Audit>,
 }
 
 fn histogram() -> Histogram {
@@ -100,13 +106,25 @@ impl Metrics {
         registry.register("queue_places", "Jobs that may wait", constant(queue));
         registry.register("threads", "Numerical threads", constant(threads));
         registry.register("panics", "Panics, contained", load.panics.clone());
-        Self { registry, requests, latency, stages, problems, poses, streams, panics: load.panics.clone() }
+        let audit_metrics = AuditMetrics::register(&mut registry);
+        let panics = load.panics.clone();
+        let audit = OnceLock::new();
+        Self { registry, requests, latency, stages, problems, poses, streams, panics, audit_metrics, audit }
     }
 
-    /// A prediction at this level took these stages.
-    pub fn predicted(&self, level: Level, stages: &[(&'static str, Duration)]) {
+    /// A question about a scene was answered so, in these stages.
+    pub fn predicted(
+        &self,
+        scene: &Arc<PreparedScene>,
+        question: &Question,
+        prediction: &Prediction,
+        stages: &[(&'static str, Duration)],
+    ) {
         for (stage, time) in stages {
-            self.stages.get_or_create(&Stage { level: level.name(), stage }).observe(time.as_secs_f64());
+            self.stages.get_or_create(&Stage { level: question.level.name(), stage }).observe(time.as_secs_f64());
+        }
+        if let Some(audit) = self.audit.get() {
+            audit.offer(scene, question, prediction);
         }
     }
 

@@ -99,7 +99,7 @@ impl Pool {
     }
 
     /// What waits and what is at work.
-    pub fn load(&self) -> &Load {
+    pub fn load(&self) -> &Arc<Load> {
         &self.load
     }
 

@@ -136,7 +136,7 @@ impl IntoResponse for Problem {
         let mut response = (self.kind.status(), body).into_response();
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));
-        if matches!(self.kind, Kind::Busy | Kind::NotReady | Kind::TooLate) {
+        if matches!(self.kind, Kind::Busy | Kind::NotReady | Kind::TooLate | Kind::StoreUnavailable) {
             headers.insert(header::RETRY_AFTER, self.retry_after_s.unwrap_or(RETRY_AFTER_S).into());
         }
         if self.kind == Kind::Unauthorized {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use axum::body::Body;
 use axum::extract::ws::WebSocketUpgrade;
-use axum::http::HeaderMap;
+use axum::http::{HeaderMap, header};
 use axum::response::Response;
 use retina_core::predict::Workspace;
 use tokio::sync::mpsc;
@@ -13,12 +13,15 @@ use tokio::sync::mpsc;
 use crate::admission;
 use crate::answer::answer;
 use crate::batch;
+use crate::body::is_json;
 use crate::pool::Ticket;
 use crate::problem::{Kind, Problem};
 use crate::simulate::{FIRST_AND_LAST, Lines, simulate};
 use crate::state::App;
 use crate::stopwatch::Stopwatch;
 use crate::stream::{self, LONGEST_MESSAGE, WebSockets};
+use crate::upload::{Upload, is_form};
+use crate::wire::StoredScene;
 
 /// What a simulation is expected to take, whatever it is: long enough to be seen by those who wait behind it.
 const SIMULATION_COST: Duration = Duration::from_secs(1);
@@ -38,7 +41,7 @@ impl App {
             let mut stopwatch = Stopwatch::start(accepted, limit, abandoned);
             let answer = answer(body.as_ref(), &scenes, &times, workspace, &mut stopwatch);
             if let Ok(answer) = &answer {
-                metrics.predicted(answer.request.level, stopwatch.stages());
+                metrics.predicted(&answer.scene, &answer.request, &answer.prediction, stopwatch.stages());
             }
             match recorder {
                 Some(recorder) => recorder.record(body.as_ref(), accepted, answer),
@@ -62,6 +65,18 @@ impl App {
         let batch = self.pool.run(self.usual_ticket(), plan).await??;
         let counters = (Arc::clone(&self.times), Arc::clone(&self.metrics));
         batch::answers(batch, Arc::clone(&self.pool), counters, limits, arrived).map(Body::from_stream)
+    }
+
+    /// Stores the scene whose body is on its way; whether it is new.
+    ///
+    /// # Errors
+    /// The problem that the caller is told of.
+    pub async fn store_scene(&self, headers: &HeaderMap, body: Body) -> Result<(StoredScene, bool), Problem> {
+        let fits = |media_type: &str| is_json(media_type) || is_form(media_type);
+        let body = self.bodies.of_type(headers, body, fits, "application/json or multipart/form-data").await?;
+        let upload = Upload::take_apart(body.bytes(), headers.get(header::CONTENT_TYPE)).await?;
+        let content = self.pool.run(self.usual_ticket(), move |_, _| upload.content()).await??;
+        self.library.keep(content).await
     }
 
     /// Simulates the sequence whose body is on its way: the lines of the answer, each as soon as it is there. The work ends when the

@@ -10,7 +10,7 @@ use axum::{Json, Router, middleware};
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
 use tower_http::trace::TraceLayer;
-use tracing::Span;
+use tracing::{Span, field};
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -19,6 +19,7 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::access;
 use crate::handlers;
 use crate::kserve;
+use crate::log;
 use crate::metrics;
 use crate::page;
 use crate::state::AppState;
@@ -45,7 +46,8 @@ pub fn app(state: AppState) -> Router {
         .routes(routes!(handlers::batch))
         .routes(routes!(handlers::simulate))
         .routes(routes!(handlers::stream))
-        .routes(routes!(handlers::scenes))
+        .routes(routes!(handlers::scenes, handlers::store_scene))
+        .routes(routes!(handlers::scene, handlers::delete_scene))
         .routes(routes!(handlers::levels))
         .routes(routes!(handlers::accuracy))
         .routes(routes!(handlers::gauges))
@@ -61,8 +63,9 @@ pub fn app(state: AppState) -> Router {
     let trace = TraceLayer::new_for_http()
         .make_span_with(span)
         .on_request(())
-        .on_response(|response: &Response<_>, latency: Duration, _span: &Span| {
+        .on_response(|response: &Response<_>, latency: Duration, span: &Span| {
             let status = response.status().as_u16();
+            span.record("status", status);
             tracing::debug!(status, latency_us = latency.as_micros(), "answered");
         })
         .on_failure(());
@@ -87,5 +90,8 @@ pub fn app(state: AppState) -> Router {
 
 fn span<B>(request: &Request<B>) -> Span {
     let id = request.headers().get(REQUEST_ID).and_then(|id| id.to_str().ok()).unwrap_or_default();
-    tracing::info_span!("request", id, method = %request.method(), path = request.uri().path())
+    let path = request.uri().path();
+    let span = tracing::info_span!("request", id, method = %request.method(), path, status = field::Empty, otel.kind = "server");
+    log::continue_trace(&span, request.headers());
+    span
 }

@@ -1,8 +1,8 @@
-//! Prepared scenes, kept: the built-in ones for good, those of requests as long as they fit.
+//! Prepared scenes, kept: the built-in ones for good, those of requests and those that are stored as long as they fit.
 //!
 //! Contract: a scene is prepared once, even when several requests bring it at the same time; the key of a scene is its whole content
-//! as canonical JSON, so that two scenes are never confused; above the limit the one that was unused for longest goes first, and
-//! one that is in use stays.
+//! as canonical JSON, or the id that stands for it, so that two scenes are never confused; above the limit the one that was unused for longest
+//! goes first, and one that is in use stays.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,6 +11,8 @@ use nalgebra::Point3;
 use retina_core::predict::PreparedScene;
 use retina_core::scene::{Scene, SceneSurface};
 
+use crate::library::Id;
+use crate::library::reader::Reader;
 use crate::problem::{Problem, from_predict};
 use crate::understand::{self, DEFAULT_SCENE};
 use crate::wire::SceneSpec;
@@ -27,6 +29,7 @@ pub struct Scenes {
     built_in: Vec<(&'static str, Slot)>,
     inline: Mutex<Inline>,
     limit_bytes: usize,
+    stored: Reader,
 }
 
 #[derive(Default)]
@@ -41,10 +44,11 @@ struct Entry {
 }
 
 impl Scenes {
-    /// Nothing is prepared yet; scenes of requests are kept up to `limit_bytes`.
-    pub fn new(limit_bytes: usize) -> Self {
+    /// Nothing is prepared yet; scenes of requests and those that are `stored` are kept up to `limit_bytes`.
+    pub fn new(limit_bytes: usize, stored: Reader) -> Self {
         let slot = |&name| (name, Slot::default());
-        Self { built_in: Scene::built_in_names().iter().map(slot).collect(), inline: Mutex::default(), limit_bytes }
+        let built_in = Scene::built_in_names().iter().map(slot).collect();
+        Self { built_in, inline: Mutex::default(), limit_bytes, stored }
     }
 
     /// The scene that a request chooses, prepared.
@@ -54,7 +58,10 @@ impl Scenes {
     pub fn get(&self, choice: Option<&SceneChoice>) -> Result<Arc<PreparedScene>, Problem> {
         match choice {
             None => self.built_in(DEFAULT_SCENE),
-            Some(SceneChoice::Name(name)) => self.built_in(name),
+            Some(SceneChoice::Name(name)) => match Id::parse(name) {
+                Some(id) => self.stored(id),
+                None => self.built_in(name),
+            },
             Some(SceneChoice::Inline(spec)) => self.inline(spec),
         }
     }
@@ -69,10 +76,28 @@ impl Scenes {
 
     fn inline(&self, spec: &SceneSpec) -> Result<Arc<PreparedScene>, Problem> {
         let key = serde_json::to_vec(spec).map_err(Problem::internal)?;
-        let slot = self.slot(&key);
-        let prepared = fill(&slot, || understand::scene(spec));
+        self.kept(&key, || understand::scene(spec))
+    }
+
+    /// The stored scene of that id, prepared. Waits for the place where it is kept if it is not in memory.
+    ///
+    /// # Errors
+    /// A problem that names the field.
+    pub fn stored(&self, id: Id) -> Result<Arc<PreparedScene>, Problem> {
+        // A scene that is written out begins with a brace, so the two kinds of keys never meet.
+        self.kept(id.to_string().as_bytes(), || self.stored.scene(id))
+    }
+
+    /// Forgets a stored scene that is no longer there.
+    pub fn forget(&self, id: Id) {
+        lock(&self.inline).entries.remove(id.to_string().as_bytes());
+    }
+
+    fn kept(&self, key: &[u8], scene: impl FnOnce() -> Result<Scene, Problem>) -> Result<Arc<PreparedScene>, Problem> {
+        let slot = self.slot(key);
+        let prepared = fill(&slot, scene);
         drop(slot);
-        self.tidy(&key);
+        self.tidy(key);
         prepared
     }
 
@@ -106,7 +131,7 @@ impl Scenes {
         }
     }
 
-    /// Memory of the scenes of requests, keys included, bytes.
+    /// Memory of the scenes of requests and of those that are stored, keys included, bytes.
     pub fn inline_bytes(&self) -> usize {
         lock(&self.inline).bytes()
     }

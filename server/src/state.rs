@@ -12,10 +12,13 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
 use crate::access::Access;
+use crate::audit::Audit;
 use crate::batch;
 use crate::body::Bodies;
 use crate::catalog;
 use crate::config::Config;
+use crate::library::reader::Reader;
+use crate::library::{Background, Library, Store};
 use crate::metrics::Metrics;
 use crate::pool::{Pool, Ticket};
 use crate::problem::{Kind, Problem};
@@ -33,6 +36,9 @@ pub type AppState = Arc<App>;
 pub struct App {
     pub(crate) scenes: Arc<Scenes>,
     pub(crate) pool: Arc<Pool>,
+    pub(crate) library: Arc<Library>,
+    /// Ends with the service.
+    _background: Background,
     warm_up: Arc<OnceLock<Result<(), Problem>>>,
     pub(crate) times: Arc<Times>,
     pub(crate) metrics: Arc<Metrics>,
@@ -73,7 +79,7 @@ impl App {
     /// Starts the numerical threads and the warm-up on the first of them. Nothing is recorded.
     ///
     /// # Errors
-    /// If the system gives no threads.
+    /// If the system gives no threads, or the place of the stored scenes cannot be used.
     pub fn start(config: &Config) -> io::Result<AppState> {
         Self::start_recorded(config, None)
     }
@@ -81,9 +87,21 @@ impl App {
     /// As [`App::start`], and hands what is asked and answered to the recorder; its owner finishes it when the service has ended.
     ///
     /// # Errors
-    /// If the system gives no threads.
+    /// As [`App::start`].
     pub fn start_recorded(config: &Config, recorder: Option<Recorder>) -> io::Result<AppState> {
-        let scenes = Arc::new(Scenes::new(config.scene_cache_bytes()));
+        let store = config.scene_store().map_err(io::Error::other)?;
+        Self::start_over(config, recorder, store)
+    }
+
+    /// As [`App::start_recorded`], with stored scenes at a place that no setting names.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn start_over(config: &Config, recorder: Option<Recorder>, store: Store) -> io::Result<AppState> {
+        let background = Background::start()?;
+        let handle = background.handle().ok_or_else(|| io::Error::other("the background ended"))?;
+        let reader = Reader::new(store.clone(), handle.clone());
+        let scenes = Arc::new(Scenes::new(config.scene_cache_bytes(), reader));
         let warm_up = Arc::new(OnceLock::new());
         let times = Arc::new(Times::default());
         let first = {
@@ -98,10 +116,20 @@ impl App {
             }
         };
         let (threads, queue) = (config.threads(), usize::from(config.queue));
-        let pool = Pool::start(threads, queue, first)?;
+        let pool = Arc::new(Pool::start(threads, queue, first)?);
+        let shared = (Arc::clone(&scenes), Arc::clone(&pool), Arc::clone(&times));
+        let metrics = Arc::new(Metrics::new(pool.load(), threads, queue));
+        if config.audit_rate > 0.0 {
+            let (load, counters) = (Arc::clone(pool.load()), metrics.audit_metrics.clone());
+            let audit = Audit::start(config.audit_rate, load, counters, recorder.clone())?;
+            // Nobody else has seen these metrics yet.
+            let _ = metrics.audit.set(audit);
+        }
         Ok(Arc::new(Self {
-            metrics: Arc::new(Metrics::new(pool.load(), threads, queue)),
-            pool: Arc::new(pool),
+            metrics,
+            library: Library::start(store, config.scene_quota(), handle, shared),
+            _background: background,
+            pool,
             bodies: Bodies::new(config.body_limit()),
             connection_limits: ConnectionLimits {
                 places: Arc::new(Semaphore::new(config.connections.into())),

@@ -16,7 +16,7 @@ use retina_core::predict::{Control, EffectChoice, Level, Request};
 use retina_core::range::ParameterRange;
 use serde_json::json;
 
-pub use scene::{built_in, chosen, scene};
+pub use scene::{built_in, chosen, scene, scene_on_file};
 pub use sequence::sequence;
 pub use stream::{Opening, opening, pose};
 

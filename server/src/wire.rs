@@ -17,6 +17,7 @@ pub mod request;
 pub mod response;
 pub mod scene;
 pub mod sequence;
+pub mod stored;
 pub mod stream;
 
 pub use batch::{BatchRequest, BatchResponse};
@@ -27,3 +28,4 @@ pub use request::PredictRequest;
 pub use response::PredictResponse;
 pub use scene::SceneSpec;
 pub use sequence::{SimulateLine, SimulateRequest};
+pub use stored::{SceneForm, StoredScene};

@@ -16,8 +16,9 @@ use retina_models::dataset::DatasetError;
 use retina_models::dataset::deformcontact::{ContactSample, export, import};
 use retina_models::dataset::draw::{Depths, LIGHT_SHARE, PathPlan, STEPS, plan};
 use retina_models::dataset::manifest::Manifest;
+use retina_models::dataset::part::Part;
 use retina_models::dataset::path::before_limit_point;
-use retina_models::dataset::run::{BLOCKS, Order, Summary, generate};
+use retina_models::dataset::run::{BLOCKS, Order, Summary, generate, generate_part};
 use retina_models::dataset::truth::TRUTH;
 use retina_models::sample::{Sample, Split};
 use retina_models::shard::{self, ShardError};
@@ -51,6 +52,30 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap());
     let files = entries.filter(|entry| entry.file_type().unwrap().is_file());
     files.map(|e| (e.file_name().to_string_lossy().into_owned(), std::fs::read(e.path()).unwrap())).collect()
+}
+
+#[test]
+fn parts_by_machines_of_a_cluster_give_the_bytes_of_one_run() {
+    let (whole, parts) = (folder("whole"), folder("parts"));
+    run(&order(20, 2), &whole);
+    let computed = std::thread::scope(|scope| {
+        let part = |text: &'static str| {
+            let parts = &parts;
+            let part =
+                move || generate_part(&order(20, 1), text.parse().unwrap(), parts, &ProgressBar::hidden()).unwrap();
+            scope.spawn(part)
+        };
+        let both = [part("0/2"), part("1/2")].map(|part| part.join().unwrap().0);
+        assert!(both.iter().all(|computed| *computed > 0), "{both:?}");
+        both.iter().sum::<u32>()
+    });
+    assert_eq!(computed, 20);
+    let summary = run(&order(20, 1), &parts);
+    assert_eq!(summary.computed, 0, "every block was there");
+    assert_eq!(files(&parts), files(&whole));
+    for wrong in ["2/2", "1", "/", "-1/2", "0/0", "a/b"] {
+        assert!(wrong.parse::<Part>().is_err(), "{wrong}");
+    }
 }
 
 #[test]

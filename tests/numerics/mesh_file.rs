@@ -1,4 +1,4 @@
-//! Reading meshes: both formats give the same, and nothing malformed gets through or brings the reader down.
+//! Reading meshes: every format gives the same, and nothing malformed gets through or brings the reader down.
 
 use retina_core::surface::mesh_file::{MeshFileError, MeshFormat, VERTEX_LIMIT, read_mesh};
 use retina_core::surface::{MeshError, TriangleMesh};
@@ -55,6 +55,80 @@ fn every_encoding_gives_the_same_mesh() {
     }
 }
 
+/// The sample as the text of an STL file: triangles with corners of their own.
+fn stl(name: &str) -> String {
+    let mesh = obj(OBJ).unwrap();
+    let facet = |corners: &[usize; 3]| {
+        let corner = |&at: &usize| {
+            let vertex = mesh.vertices()[at];
+            format!("   vertex {} {} {}\n", vertex.x, vertex.y, vertex.z)
+        };
+        let corners: String = corners.iter().map(corner).collect();
+        format!(" facet normal 0 0 1\n  outer loop\n{corners}  endloop\n endfacet\n")
+    };
+    let facets: String = mesh.triangles().iter().map(facet).collect();
+    format!("solid{name}\n{facets}endsolid{name}\n")
+}
+
+/// The sample as a binary STL file that begins with these bytes.
+fn binary_stl(header: &str) -> Vec<u8> {
+    let mesh = obj(OBJ).unwrap();
+    let mut bytes = format!("{header:80}").into_bytes();
+    bytes.extend((mesh.triangles().len() as u32).to_le_bytes());
+    for corners in mesh.triangles() {
+        bytes.extend([0; 12]);
+        let numbers =
+            corners.iter().flat_map(|&corner| mesh.vertices()[corner].coords.iter().copied().collect::<Vec<_>>());
+        bytes.extend(numbers.flat_map(|number| (number as f32).to_le_bytes()));
+        bytes.extend([7, 7]);
+    }
+    bytes
+}
+
+#[test]
+fn every_encoding_of_stl_gives_the_same_mesh() {
+    // Vertices come in the order of the triangles: 0, 1, 2, 3, and 4 as the sample's fifth.
+    let mesh = obj(OBJ).unwrap();
+    for text in [stl(""), stl(" a thing"), stl("").replace('\n', "\r\n")] {
+        let read = read_mesh(text.as_bytes(), MeshFormat::Stl).unwrap();
+        assert_eq!(
+            (read.vertices()[..4].to_vec(), read.triangles()),
+            (mesh.vertices()[..4].to_vec(), mesh.triangles())
+        );
+        assert!((read.vertices()[4] - mesh.vertices()[4]).norm() < 1e-15, "as near as f32 has it");
+    }
+    for header in ["", "solid but binary", "anything"] {
+        let read = read_mesh(&binary_stl(header), MeshFormat::Stl).unwrap();
+        assert_eq!(read.triangles(), mesh.triangles(), "{header}");
+    }
+}
+
+#[test]
+fn stl_files_that_are_wrong_are_refused() {
+    let refused = |bytes: &[u8]| read_mesh(bytes, MeshFormat::Stl).unwrap_err().to_string();
+    let two = stl(" one") + &stl(" two");
+    assert!(refused(two.as_bytes()).contains("2 solids"), "{}", refused(two.as_bytes()));
+    let mut announced = binary_stl("");
+    announced[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
+    assert!(refused(&announced).contains("4294967295 triangles take"), "{}", refused(&announced));
+    assert!(refused(b"nonsense").contains("neither"));
+    assert!(refused(stl("").replace("vertex 1 0 0", "vertex 1 nan 0").as_bytes()).contains("triangle 0"));
+    assert_eq!(read_mesh(b"solid\nendsolid\n", MeshFormat::Stl), Err(MeshFileError::Empty));
+}
+
+#[test]
+fn names_tell_formats() {
+    for (name, format) in [
+        ("retina.ply", Some(MeshFormat::Ply)),
+        ("a.b.OBJ", Some(MeshFormat::Obj)),
+        (".stl", Some(MeshFormat::Stl)),
+        ("stl", None),
+        ("retina.stl.gz", None),
+    ] {
+        assert_eq!(MeshFormat::of_name(name), format, "{name}");
+    }
+}
+
 #[test]
 fn truncated_files_are_errors_and_never_panics() {
     // The last number may lose digits and still be one, so the cut stops short of it.
@@ -62,6 +136,9 @@ fn truncated_files_are_errors_and_never_panics() {
         (OBJ.as_bytes().to_vec(), MeshFormat::Obj, OBJ.len()),
         (PLY.as_bytes().to_vec(), MeshFormat::Ply, 3),
         (binary_ply(false), MeshFormat::Ply, 1),
+        // Nothing is read after `endsolid`.
+        (stl("").into_bytes(), MeshFormat::Stl, 2),
+        (binary_stl("solid"), MeshFormat::Stl, 1),
     ] {
         for length in 0..bytes.len() {
             let result = read_mesh(&bytes[..length], format);
@@ -74,16 +151,20 @@ fn truncated_files_are_errors_and_never_panics() {
 fn garbage_is_an_error() {
     let mut state = 1u64;
     for round in 0..300 {
-        let mut bytes = if round % 3 == 0 { vec![0; 200] } else { binary_ply(round % 3 == 1) };
+        let mut bytes = match round % 4 {
+            0 => vec![0; 200],
+            1 => binary_stl("solid"),
+            other => binary_ply(other == 2),
+        };
         for _ in 0..=(round / 10) {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             let place = (state >> 33) as usize % bytes.len();
             bytes[place] = (state >> 24) as u8;
         }
-        for format in [MeshFormat::Ply, MeshFormat::Obj] {
+        for format in [MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl] {
             // Some changes leave a mesh; what counts is that every input comes back as one or as an error.
             if let Ok(mesh) = read_mesh(&bytes, format) {
-                assert!(format == MeshFormat::Ply && !mesh.triangles().is_empty());
+                assert!(format != MeshFormat::Obj && !mesh.triangles().is_empty());
             }
         }
     }

@@ -7,12 +7,15 @@ use serde_json::Value;
 use crate::harness::{get, post, predict, request, send};
 use crate::schema::{assert_matches, check, description};
 
-const ROUTES: [(&str, &str); 13] = [
+const ROUTES: [(&str, &str); 16] = [
     ("post", "/v1/predict"),
     ("post", "/v1/predict/batch"),
     ("post", "/v1/simulate"),
     ("get", "/v1/stream"),
     ("get", "/v1/scenes"),
+    ("post", "/v1/scenes"),
+    ("get", "/v1/scenes/{id}"),
+    ("delete", "/v1/scenes/{id}"),
     ("get", "/v1/levels"),
     ("get", "/v1/accuracy"),
     ("get", "/v1/gauges"),

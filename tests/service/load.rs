@@ -8,6 +8,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use retina_core::predict::Workspace;
+use retina_server::library::Store;
+use retina_server::library::reader::Reader;
 use retina_server::pool::{Pool, PoolError, Ticket};
 use retina_server::scenes::Scenes;
 use retina_server::wire::request::SceneChoice;
@@ -143,9 +145,14 @@ fn sphere(radius_mm: f64) -> SceneChoice {
     serde_json::from_value(json!({"surface": {"kind": "sphere", "radius_mm": radius_mm}})).expect("scene")
 }
 
+/// Scenes kept up to so many bytes, none of them stored.
+fn scenes(limit_bytes: usize) -> Scenes {
+    Scenes::new(limit_bytes, Reader::new(Store::in_memory(), runtime().handle().clone()))
+}
+
 #[test]
 fn a_scene_is_prepared_once_for_all_who_ask() {
-    let scenes = Scenes::new(64 << 20);
+    let scenes = scenes(64 << 20);
     let prepared: Vec<_> = thread::scope(|scope| {
         let calls: Vec<_> = (0..8).map(|_| scope.spawn(|| scenes.get(Some(&sphere(11.0))).ok())).collect();
         calls.into_iter().map(|call| call.join().expect("thread").expect("scene")).collect()
@@ -158,7 +165,7 @@ fn a_scene_is_prepared_once_for_all_who_ask() {
 #[test]
 fn scenes_that_nobody_uses_make_room_and_used_ones_stay() {
     let one = {
-        let scenes = Scenes::new(usize::MAX);
+        let scenes = scenes(usize::MAX);
         drop(scenes.get(Some(&sphere(10.0))));
         scenes.inline_bytes()
     };
@@ -174,7 +181,7 @@ fn scenes_that_nobody_uses_make_room_and_used_ones_stay() {
 
 #[test]
 fn a_scene_that_cannot_be_prepared_is_not_kept() {
-    let scenes = Scenes::new(64 << 20);
+    let scenes = scenes(64 << 20);
     for _ in 0..2 {
         assert!(scenes.get(Some(&sphere(1.0))).is_err());
         assert_eq!(scenes.inline_bytes(), 0);

@@ -6,10 +6,13 @@
 
 mod access;
 mod answers;
+mod audit;
 mod batch;
+mod behind_nginx;
 mod budgets;
 mod catalog;
 mod clients;
+mod export;
 mod faults;
 mod harness;
 mod igtl;
@@ -27,4 +30,5 @@ mod refusals;
 mod schema;
 mod sequences;
 mod sockets;
+mod stored;
 mod stream;

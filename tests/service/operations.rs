@@ -11,14 +11,14 @@ use serde_json::json;
 use crate::harness::{Running, agent, request, runtime, state, with};
 use crate::schema::assert_matches;
 
-fn metrics(service: &Running) -> String {
+pub fn metrics(service: &Running) -> String {
     let mut response = agent().get(service.url("/metrics")).call().expect("answer");
     assert!(response.headers()["content-type"].to_str().expect("text").starts_with("application/openmetrics-text"));
     response.body_mut().read_to_string().expect("text")
 }
 
 /// The value of one series.
-fn value(text: &str, series: &str) -> f64 {
+pub fn value(text: &str, series: &str) -> f64 {
     let line = text.lines().find_map(|line| line.strip_prefix(series).and_then(|rest| rest.strip_prefix(' ')));
     line.unwrap_or_else(|| panic!("no {series} in\n{text}")).parse().expect("number")
 }

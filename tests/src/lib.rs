@@ -13,6 +13,7 @@ pub mod overload;
 pub mod promise;
 pub mod random_scene;
 pub mod search;
+pub mod spawned;
 pub mod stated_errors;
 pub mod stream_client;
 pub mod tolerance;

@@ -127,7 +127,7 @@ impl Generator {
         let scene = json!({"surface": {"kind": "foveal_pit", "radius_mm": 11.0, "depth_mm": 0.1},
             "tissue": {"retina": [{"thickness_mm": 0.1}, {"thickness_mm": 0.15}], "choroid": {"youngs_modulus_kpa": 5.0}}});
         let accuracy = json!({"level": "linear"});
-        let (path, message) = match self.rng.u8(0..4) {
+        let (path, message) = match self.rng.u8(0..5) {
             0 => (
                 "/v1/predict/batch",
                 json!({"poses": [{"needle": needle, "force_mn": [0, 0, -0.3]}, {"needle": needle, "control": "pose"}],
@@ -141,6 +141,7 @@ impl Generator {
                 "/v1/predict",
                 json!({"needle": needle, "force_mn": [0, 0, -0.3], "scene": scene, "accuracy": accuracy}),
             ),
+            3 => ("/v1/scenes", scene),
             _ => (
                 "/v1/predict",
                 json!({"needle": needle, "force_mn": [0, 0.1, -0.3], "scene": "fovea", "accuracy": accuracy, "effects": "auto"}),

@@ -97,12 +97,14 @@ impl Weights {
                 expected,
                 found: format!("{} {:?} at bytes {:?}", entry.dtype, entry.shape, entry.offsets),
             };
-            let count: usize = entry.shape.iter().product();
+            let count = entry.shape.iter().try_fold(1usize, |count, length| count.checked_mul(*length));
+            let length = count.and_then(|count| count.checked_mul(size_of::<f32>()));
             let bytes = match (entry.dtype.as_str(), entry.offsets.as_slice()) {
-                ("F32", &[start, end]) if end.checked_sub(start) == count.checked_mul(4) => data.get(start..end),
+                ("F32", &[start, end]) if length.is_some() && end.checked_sub(start) == length => data.get(start..end),
                 _ => None,
             };
-            let bytes = bytes.ok_or_else(|| wrong(format!("F32 with {count} numbers inside of the file")))?;
+            let bytes = bytes
+                .ok_or_else(|| wrong("F32 with as many numbers as the shape says, inside of the file".to_owned()))?;
             let numbers: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|four| f32::from_le_bytes(*four)).collect();
             if let Some(index) = numbers.iter().position(|number| !number.is_finite()) {
                 return Err(WeightsError::NotFinite { name, index });

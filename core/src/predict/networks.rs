@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::types::{Level, PredictError};
 use crate::network::contact::{ContactNetwork, Start};
-use crate::network::weights::WeightsError;
+use crate::network::weights::{WeightsError, hash};
 
 const CONTACT: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/../models/weights/contact.safetensors"));
 const CORRECTED: &[u8] =
@@ -31,6 +31,11 @@ impl Networks {
     pub fn shipped() -> Arc<Self> {
         static SHIPPED: OnceLock<Arc<Networks>> = OnceLock::new();
         SHIPPED.get_or_init(|| Arc::new(Self::read(CONTACT, CORRECTED))).clone()
+    }
+
+    /// The SHA-256 of the weights of each learned level that ship, in hexadecimal digits.
+    pub fn shipped_hashes() -> [(Level, String); 2] {
+        [(Level::Network, hash(CONTACT)), (Level::Corrected, hash(CORRECTED))]
     }
 
     /// The network of `level`.

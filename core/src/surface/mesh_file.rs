@@ -1,4 +1,4 @@
-//! Triangle meshes from the bytes of PLY and OBJ files.
+//! Triangle meshes from the bytes of PLY, OBJ and STL files.
 //!
 //! Contract: positions in mm, polygons as fans of triangles around their first corner; equal vertices are merged and triangles
 //! without area dropped, as in [`TriangleMesh::welded`]. Normals, colours and textures are ignored. Every malformed input is an error,
@@ -10,7 +10,7 @@ use nalgebra::Point3;
 use thiserror::Error;
 
 use super::triangle_mesh::{MeshError, TriangleMesh};
-use super::{obj, ply};
+use super::{obj, ply, stl};
 
 /// Vertices that a file may have, before merging.
 pub const VERTEX_LIMIT: usize = 2_000_000;
@@ -25,6 +25,21 @@ pub enum MeshFormat {
     Ply,
     /// Wavefront text.
     Obj,
+    /// Stereolithography, text or binary.
+    Stl,
+}
+
+impl MeshFormat {
+    /// Every format with the ending of its file names.
+    pub const ENDINGS: [(&'static str, MeshFormat); 3] =
+        [("ply", MeshFormat::Ply), ("obj", MeshFormat::Obj), ("stl", MeshFormat::Stl)];
+
+    /// The format of a file of this name, by its ending in small or capital letters; `None` for any other.
+    pub fn of_name(name: &str) -> Option<Self> {
+        let (_, ending) = name.rsplit_once('.')?;
+        let named = Self::ENDINGS.iter().find(|(known, _)| known.eq_ignore_ascii_case(ending));
+        named.map(|(_, format)| *format)
+    }
 }
 
 /// Why bytes are not a mesh.
@@ -93,6 +108,7 @@ pub fn read_mesh(bytes: &[u8], format: MeshFormat) -> Result<TriangleMesh, MeshF
     let Polygons { vertices, triangles } = match format {
         MeshFormat::Ply => ply::read(bytes)?,
         MeshFormat::Obj => obj::read(bytes)?,
+        MeshFormat::Stl => stl::read(bytes)?,
     };
     let mesh = TriangleMesh::welded(vertices, triangles)?;
     if mesh.triangles().is_empty() {

@@ -10,8 +10,9 @@ use indicatif::ProgressBar;
 use crate::dataset::DatasetError;
 use crate::dataset::draw::Depths;
 use crate::dataset::manifest::Manifest;
+use crate::dataset::part::Part;
 use crate::dataset::report::report;
-use crate::dataset::run::{Order, Summary, generate};
+use crate::dataset::run::{Order, Summary, generate, generate_part};
 use crate::sample::Sample;
 use crate::shard;
 
@@ -36,6 +37,10 @@ pub struct Arguments {
     /// Threads; as many as the machine has cores if left out.
     #[arg(long)]
     threads: Option<usize>,
+    /// Which part to compute, as `2/8` for the third of eight: only what its blocks lack, on a machine of a cluster beside those of the other
+    /// parts. When all are done, the same command without it makes the shards.
+    #[arg(long)]
+    part: Option<Part>,
 }
 
 /// Arguments of `dataset-report`.
@@ -54,6 +59,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let order =
         Order { depths: arguments.depths, ..Order::new(&arguments.scene, arguments.paths, arguments.seed, threads) };
     let start = Instant::now();
+    if let Some(part) = arguments.part {
+        let (computed, new_samples) = generate_part(&order, part, &arguments.out, &ProgressBar::new(0))?;
+        let minutes = start.elapsed().as_secs_f64() / 60.0;
+        println!("this part: {computed} paths, {new_samples} samples in {minutes:.1} minutes with {threads} threads");
+        return Ok(());
+    }
     let Summary { counts, computed, new_samples } = generate(&order, &arguments.out, &ProgressBar::new(0))?;
     let minutes = start.elapsed().as_secs_f64() / 60.0;
     println!(

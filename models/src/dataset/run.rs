@@ -16,6 +16,7 @@ use super::blocks::{BlockRecord, Blocks, PATHS_PER_BLOCK};
 use super::draw::{Depths, plan};
 use super::error::DatasetError;
 use super::manifest::{Counts, FILE, Manifest, Settings};
+use super::part::Part;
 use super::path::{Cause, Path, PathMemory, PathOutcome, before_limit_point};
 use super::shards::Shards;
 use super::truth;
@@ -77,20 +78,7 @@ pub struct Summary {
 /// # Errors
 /// [`DatasetError`]; what was finished before it stays.
 pub fn generate(order: &Order, folder: &FilePath, progress: &ProgressBar) -> Result<Summary, DatasetError> {
-    let scenes = order.scenes()?;
-    for (field, value) in [("paths", order.paths as usize), ("threads", order.threads)] {
-        if value == 0 {
-            return Err(DatasetError::Value { field, value: value.to_string(), allowed: "1 or more".to_owned() });
-        }
-    }
-    std::fs::create_dir_all(folder).map_err(DatasetError::io(folder))?;
-    let settings = Settings::new(order.seed, &scenes, order.depths);
-    settings.check(folder)?;
-    if !folder.join(FILE).exists() {
-        let counts = Counts { paths: order.paths, ..Counts::default() };
-        Manifest::new(settings.clone(), counts, Vec::new()).write(folder)?;
-    }
-    let blocks = Blocks::open(&folder.join(BLOCKS))?;
+    let (scenes, settings, blocks) = begin(order, folder)?;
     let mut finished = Vec::new();
     for block in 0..order.paths.div_ceil(PATHS_PER_BLOCK) {
         let (from, to) = order.paths_of(block);
@@ -102,8 +90,7 @@ pub fn generate(order: &Order, folder: &FilePath, progress: &ProgressBar) -> Res
     let mut collected = Collected { settings, folder, shards: Shards::new(folder), counts: Counts::default() };
     collected.counts.paths = order.paths;
     let mut summary = Summary { counts: Counts::default(), computed: 0, new_samples: 0 };
-    progress.set_style(ProgressStyle::with_template(TEMPLATE).unwrap_or_else(|_| ProgressStyle::default_bar()));
-    progress.set_length(u64::from(order.paths));
+    show(progress, order.paths);
     std::thread::scope(|scope| -> Result<(), DatasetError> {
         let (done, news) = channel();
         for _ in 0..order.threads.min(missing.len()) {
@@ -135,6 +122,76 @@ pub fn generate(order: &Order, folder: &FilePath, progress: &ProgressBar) -> Res
     collected.flush()?;
     progress.finish();
     Ok(Summary { counts: collected.counts, ..summary })
+}
+
+/// Computes the blocks of one part that are missing in `folder`, and leaves shards and manifest to a run without a part, which finds every block
+/// finished. Runs of other parts may go on in the same folder at the same time. Returns the paths computed and the samples that they gave.
+///
+/// # Errors
+/// [`DatasetError`]; what was finished before it stays.
+pub fn generate_part(
+    order: &Order,
+    part: Part,
+    folder: &FilePath,
+    progress: &ProgressBar,
+) -> Result<(u32, usize), DatasetError> {
+    let (scenes, _, blocks) = begin(order, folder)?;
+    let mut missing = Vec::new();
+    for block in (0..order.paths.div_ceil(PATHS_PER_BLOCK)).filter(|block| part.has(*block)) {
+        let (from, to) = order.paths_of(block);
+        if blocks.record(block, from, to)?.is_none() {
+            missing.push(block);
+        }
+    }
+    let work = Work::new(order, &scenes, &blocks, &missing)?;
+    show(progress, missing.iter().map(|block| order.paths_of(*block)).map(|(from, to)| to - from).sum());
+    let (mut computed, mut new_samples) = (0, 0);
+    std::thread::scope(|scope| -> Result<(), DatasetError> {
+        let (done, news) = channel();
+        for _ in 0..order.threads.min(missing.len()) {
+            let (done, work) = (done.clone(), &work);
+            scope.spawn(move || work.labour(&done));
+        }
+        drop(done);
+        let counted = news.iter().try_for_each(|message| {
+            let (_, record) = message?;
+            computed += record.paths.len() as u32;
+            new_samples += record.paths.iter().map(|path| path.samples).sum::<usize>();
+            progress.set_position(u64::from(computed));
+            progress.set_message(format!("{new_samples} samples"));
+            Ok(())
+        });
+        work.stop.store(true, Ordering::Relaxed);
+        counted
+    })?;
+    progress.finish();
+    Ok((computed, new_samples))
+}
+
+/// Checks an order and opens its folder: the scenes, what the samples are drawn from, the blocks.
+fn begin(order: &Order, folder: &FilePath) -> Result<(Vec<u8>, Settings, Blocks), DatasetError> {
+    let scenes = order.scenes()?;
+    for (field, value) in [("paths", order.paths as usize), ("threads", order.threads)] {
+        if value == 0 {
+            return Err(DatasetError::Value { field, value: value.to_string(), allowed: "1 or more".to_owned() });
+        }
+    }
+    std::fs::create_dir_all(folder).map_err(DatasetError::io(folder))?;
+    let settings = Settings::new(order.seed, &scenes, order.depths);
+    settings.check(folder)?;
+    let manifest = folder.join(FILE);
+    if !manifest.exists() {
+        let counts = Counts { paths: order.paths, ..Counts::default() };
+        let written = Manifest::new(settings.clone(), counts, Vec::new()).write(folder);
+        // A run of another part may have written the same a moment before.
+        written.or_else(|error| if manifest.exists() { settings.check(folder) } else { Err(error) })?;
+    }
+    Ok((scenes, settings, Blocks::open(&folder.join(BLOCKS))?))
+}
+
+fn show(progress: &ProgressBar, paths: u32) {
+    progress.set_style(ProgressStyle::with_template(TEMPLATE).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    progress.set_length(u64::from(paths));
 }
 
 const TEMPLATE: &str = "{bar:40} {pos}/{len} paths, {msg}, {elapsed_precise} (still {eta_precise})";

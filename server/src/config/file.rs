@@ -72,8 +72,9 @@ fn word(name: &str, value: &Value) -> Result<String, String> {
     match value {
         Value::String(text) => Ok(text.clone()),
         Value::Integer(number) => Ok(number.to_string()),
+        Value::Float(number) => Ok(number.to_string()),
         Value::Boolean(truth) => Ok(truth.to_string()),
-        _ => Err(format!("{name} is text, a whole number or a list of texts")),
+        _ => Err(format!("{name} is text, a number or a list of texts")),
     }
 }
 

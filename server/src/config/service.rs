@@ -1,5 +1,6 @@
 //! Every setting of the service.
 
+use std::ffi::OsString;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
@@ -9,6 +10,7 @@ use axum::http::HeaderValue;
 use clap::{Args, ValueEnum};
 
 use crate::access::{Access, SHORTEST_TOKEN};
+use crate::library::{Quota, Store, StoreError};
 use crate::recording::Destination;
 
 /// How to serve.
@@ -36,6 +38,19 @@ pub struct Config {
     /// Memory for the prepared scenes of requests, MiB. The built-in ones come on top.
     #[arg(long, env = "RETINA_SCENE_CACHE_MIB", default_value_t = 64)]
     pub scene_cache_mib: u16,
+    /// Where the scenes of POST /v1/scenes are kept: a folder, or a URL such as `s3://bucket/scenes` (cargo feature `s3`; the variables AWS_ENDPOINT_URL,
+    /// AWS_ACCESS_KEY_ID and so on say the rest). In memory, until the service ends, when left out.
+    #[arg(long, env = "RETINA_SCENE_STORE", value_name = "PLACE")]
+    pub scene_store: Option<String>,
+    /// Scenes that may be stored.
+    #[arg(long, env = "RETINA_STORED_SCENES", default_value_t = 256)]
+    pub stored_scenes: u16,
+    /// What one stored scene may take, MiB.
+    #[arg(long, env = "RETINA_STORED_SCENE_MIB", default_value_t = 16)]
+    pub stored_scene_mib: u16,
+    /// What all stored scenes may take, MiB.
+    #[arg(long, env = "RETINA_SCENE_STORE_MIB", default_value_t = 256)]
+    pub scene_store_mib: u32,
     /// Milliseconds after which the work on a request is stopped.
     #[arg(long, env = "RETINA_TIME_LIMIT_MS", default_value_t = 30_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub time_limit_ms: u32,
@@ -73,6 +88,13 @@ pub struct Config {
     /// Form of the log on standard error. RUST_LOG says what is logged; `retina_server=debug` has a line for each request.
     #[arg(long, env = "RETINA_LOG", default_value = "pretty")]
     pub log: LogForm,
+    /// Address of an OpenTelemetry collector that takes the spans of requests (OTLP over HTTP), as `http://127.0.0.1:4318`.
+    #[arg(long, env = "RETINA_OTLP_ENDPOINT", value_name = "URL")]
+    pub otlp_endpoint: Option<String>,
+    /// Share of the predictions, 0 to 1, that are computed again at level `reference` while the service has nothing else to do; what they were off
+    /// by is told beside what they promised, by the metrics.
+    #[arg(long, env = "RETINA_AUDIT_RATE", default_value_t = 0.0, value_parser = share)]
+    pub audit_rate: f64,
     /// Record what is asked and answered in this file, for the rerun viewer (cargo feature `rerun`).
     #[arg(long, env = "RETINA_RECORD", value_name = "FILE.rrd", conflicts_with = "record_connect")]
     pub record: Option<PathBuf>,
@@ -98,6 +120,11 @@ fn token(text: &str) -> Result<String, String> {
     }
 }
 
+fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse::<f64>().ok().filter(|share| (0.0..=1.0).contains(share));
+    share.ok_or_else(|| "a share is a number from 0 to 1".to_owned())
+}
+
 fn origin(text: &str) -> Result<HeaderValue, String> {
     let host = text.strip_prefix("https://").or_else(|| text.strip_prefix("http://"));
     let is_origin = host.is_some_and(|host| !host.is_empty() && !host.contains(['/', '*', ' ', '?', '#']));
@@ -120,6 +147,27 @@ impl Config {
     /// Memory for the prepared scenes of requests, bytes.
     pub fn scene_cache_bytes(&self) -> usize {
         usize::from(self.scene_cache_mib) << 20
+    }
+
+    /// Where scenes are stored.
+    ///
+    /// # Errors
+    /// [`StoreError`] with what is wrong with the place.
+    pub fn scene_store(&self) -> Result<Store, StoreError> {
+        let text = |(name, value): (OsString, OsString)| Some((name.into_string().ok()?, value.into_string().ok()?));
+        match &self.scene_store {
+            None => Ok(Store::in_memory()),
+            Some(place) => Store::open(place, std::env::vars_os().filter_map(text)),
+        }
+    }
+
+    /// How many scenes may be stored, and how large.
+    pub fn scene_quota(&self) -> Quota {
+        Quota {
+            scenes: self.stored_scenes.into(),
+            each: u64::from(self.stored_scene_mib) << 20,
+            total: u64::from(self.scene_store_mib) << 20,
+        }
     }
 
     /// How long the work on a request may take.

@@ -21,6 +21,8 @@ pub struct Load {
     /// Jobs that panicked.
     pub panics: Counter,
     began: Instant,
+    /// Jobs that have come since the beginning.
+    arrived: AtomicU64,
     waiting_cost_us: AtomicI64,
     /// What jobs took over what they were expected to take, a running mean; the bits of an f64.
     ratio: AtomicU64,
@@ -35,6 +37,7 @@ impl Load {
             waiting: Gauge::default(),
             panics: Counter::default(),
             began: Instant::now(),
+            arrived: AtomicU64::new(0),
             waiting_cost_us: AtomicI64::new(0),
             ratio: AtomicU64::new(1f64.to_bits()),
             busy_until_us: (0..threads).map(|_| AtomicU64::new(0)).collect(),
@@ -59,6 +62,16 @@ impl Load {
         let waiting_us = self.waiting_cost_us.load(Ordering::Relaxed).max(0) as u64;
         let waiting_us = (waiting_us as f64 * self.ratio()) as u64;
         Duration::from_micros((left_us + waiting_us) / self.busy_until_us.len() as u64)
+    }
+
+    /// Jobs that have come since the beginning.
+    pub fn arrived(&self) -> u64 {
+        self.arrived.load(Ordering::Relaxed)
+    }
+
+    /// Whether no job waits and none is at work.
+    pub fn is_idle(&self) -> bool {
+        self.waiting.get() == 0 && self.busy_until_us.iter().all(|until| until.load(Ordering::Relaxed) == 0)
     }
 
     fn ratio(&self) -> f64 {
@@ -87,6 +100,9 @@ impl Load {
 
     /// A job has come to the queue (`sign` 1), or has left it (-1).
     pub(super) fn queued(&self, ticket: Ticket, sign: i64) {
+        if sign > 0 {
+            self.arrived.fetch_add(1, Ordering::Relaxed);
+        }
         self.waiting.inc_by(sign);
         self.waiting_cost_us.fetch_add(sign * ticket.cost.as_micros() as i64, Ordering::Relaxed);
     }

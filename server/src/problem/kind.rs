@@ -67,6 +67,16 @@ kinds! {
     NoEquilibrium = "no-equilibrium", UNPROCESSABLE_ENTITY, "No equilibrium was found",
         "The solver did not converge, and an unconverged state is never an answer. `detail` has the residual. A smaller force, a \
          stiffer tissue or another level may help.";
+    SceneTooLarge = "scene-too-large", PAYLOAD_TOO_LARGE, "The scene is too large to be stored",
+        "GET /v1/scenes says under `store` what one scene may take. Thin out the mesh, or cut it around where the needle goes.";
+    StoreFull = "store-full", INSUFFICIENT_STORAGE, "There is no room for another scene",
+        "The quota of stored scenes is used up, or the disk is full. Nothing was stored. GET /v1/scenes says under `store` what is allowed; \
+         DELETE /v1/scenes/{id} makes room.";
+    StoreUnavailable = "store-unavailable", SERVICE_UNAVAILABLE, "The place of the stored scenes does not answer",
+        "The folder or the object store where scenes are kept cannot be read or written; the server's log says why. Built-in scenes and scenes \
+         written out in a request work all the same.";
+    CorruptScene = "corrupt-scene", UNPROCESSABLE_ENTITY, "The stored scene is corrupt",
+        "What is stored under the id is not what was given, so it is not used. Store the scene again, which replaces it, or delete it.";
     NotFound = "not-found", NOT_FOUND, "There is no such page",
         "GET / links to what there is.";
     MethodNotAllowed = "method-not-allowed", METHOD_NOT_ALLOWED, "The page does not take this method",
@@ -75,8 +85,8 @@ kinds! {
         "The body of a request must arrive within ten seconds, or what the server is configured with.";
     BodyTooLarge = "body-too-large", PAYLOAD_TOO_LARGE, "The body is too large",
         "A body may have 8 MiB. Thin out the mesh, or cut it around the needle: the nodes are the 64 vertices nearest to the contact.";
-    UnsupportedMediaType = "unsupported-media-type", UNSUPPORTED_MEDIA_TYPE, "The body is not announced as JSON",
-        "Send the header Content-Type: application/json.";
+    UnsupportedMediaType = "unsupported-media-type", UNSUPPORTED_MEDIA_TYPE, "The body is not announced as what it must be",
+        "Send the header Content-Type: application/json; POST /v1/scenes takes multipart/form-data too.";
     Unauthorized = "unauthorized", UNAUTHORIZED, "A token is needed",
         "This server answers those who have a token: send the header Authorization: Bearer TOKEN.";
     ForeignOrigin = "foreign-origin", FORBIDDEN, "The page comes from elsewhere",

@@ -17,11 +17,12 @@
 //! | `request` | what was asked and how it went | text |
 //! | `failures` | refusals and failures | text |
 //! | `dropped/requests` | service: requests that the recording lost so far | 1 |
+//! | `audit/measured`, `audit/promised` | service: error of an audited answer's worst node, and its promised 95 % bound; by `wall_time` alone | µm |
 //!
 //! Timelines: `sample` (review, index from 0); `wall_time` (service, when the request had arrived) and `request` (service, its
 //! number from 1; a gap is a request that the recording lost). What a sample or request does not have is cleared.
 
-use std::time::UNIX_EPOCH;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use rerun::components::MarkerShape;
 use rerun::{
@@ -37,6 +38,7 @@ use super::needle_mesh::SHAFT_MM;
 use super::request_text;
 use super::shapes::{EDGE, FORCE, REACTION, REST_EDGE, arrow, edges, error_arrows, needle, pose, surface};
 use super::{Destination, Exchange, RecordingError, Sink, stream};
+use crate::audit::Audited;
 use crate::review::{Compared, Sample};
 
 /// Timeline of a review.
@@ -89,11 +91,13 @@ const REVIEW_SERIES: [(&str, &str, u32); 8] = [
 ];
 
 /// Series of a service, likewise.
-const SERVICE_SERIES: [(&str, &str, u32); 4] = [
+const SERVICE_SERIES: [(&str, &str, u32); 6] = [
     ("displacement/largest", "largest", 0x7ad1_51ff),
     ("time/answer_ms", "answer", 0x4fc3_f7ff),
     ("iterations/answer", "answer", 0x4fc3_f7ff),
     ("dropped/requests", "missing", 0xef53_50ff),
+    ("audit/measured", "measured (µm)", 0xef53_50ff),
+    ("audit/promised", "promised for 95 of 100 (µm)", 0xffb3_00ff),
 ];
 
 /// What stays the same throughout a recording.
@@ -291,7 +295,23 @@ impl ServiceLog {
     }
 }
 
+impl ServiceLog {
+    /// An audit comes some time after its answer and belongs to no request of the timeline.
+    fn audit(&mut self, audited: &Audited) -> RecordingStreamResult<()> {
+        let stream = &self.stream;
+        let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        stream.reset_time();
+        stream.set_timestamp_nanos_since_epoch(WALL_TIME, since_epoch.as_nanos() as i64);
+        scalar(stream, "audit/measured", audited.measured_um)?;
+        scalar(stream, "audit/promised", audited.promised.p95_um)
+    }
+}
+
 impl Sink for ServiceLog {
+    fn audited(&mut self, audited: &Audited) -> Result<(), RecordingError> {
+        self.audit(audited).map_err(|error| RecordingError::Write(error.into()))
+    }
+
     fn write(&mut self, exchange: &Exchange, dropped: u64) -> Result<(), RecordingError> {
         self.exchange(exchange, dropped).map_err(|error| RecordingError::Write(error.into()))
     }

@@ -16,6 +16,7 @@ use retina_core::predict::{Prediction, Request};
 
 use super::RecordingError;
 use crate::answer::Answer;
+use crate::audit::Audited;
 use crate::problem::Problem;
 
 /// Exchanges that may wait to be written: some megabytes.
@@ -50,6 +51,15 @@ pub trait Sink: Send + 'static {
     /// If it could not be written.
     fn write(&mut self, exchange: &Exchange, dropped: u64) -> Result<(), RecordingError>;
 
+    /// Writes what an audit found; a sink that has no place for it does nothing.
+    ///
+    /// # Errors
+    /// If it could not be written.
+    fn audited(&mut self, audited: &Audited) -> Result<(), RecordingError> {
+        let _ = audited;
+        Ok(())
+    }
+
     /// Everything was written.
     ///
     /// # Errors
@@ -72,6 +82,7 @@ pub struct Totals {
 
 enum Message {
     Exchange(Box<Exchange>),
+    Audited(Audited),
     End,
 }
 
@@ -123,23 +134,27 @@ impl Recorder {
         outcome: Result<Answer, Problem>,
     ) -> Result<Vec<u8>, Problem> {
         let (bytes, outcome) = match outcome {
-            Ok(Answer { bytes, request, prediction }) => (Ok(bytes), Ok((request, prediction))),
+            Ok(Answer { bytes, request, prediction, .. }) => (Ok(bytes), Ok((request, prediction))),
             Err(problem) => (Err(problem.clone()), Err(problem)),
         };
         let took = accepted.elapsed();
         let text = String::from_utf8_lossy(&asked[..asked.len().min(LONGEST_TEXT)]).into_owned();
-        self.hand_over(Exchange {
+        self.hand_over(Message::Exchange(Box::new(Exchange {
             number: self.counters.answered.fetch_add(1, Ordering::Relaxed) + 1,
             arrived: SystemTime::now() - took,
             took,
             asked: text,
             outcome,
-        });
+        })));
         bytes
     }
 
-    fn hand_over(&self, exchange: Exchange) {
-        let message = Message::Exchange(Box::new(exchange));
+    /// Hands over what an audit found.
+    pub fn audited(&self, audited: Audited) {
+        self.hand_over(Message::Audited(audited));
+    }
+
+    fn hand_over(&self, message: Message) {
         if let Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) = self.queue.try_send(message) {
             let dropped = self.counters.dropped.fetch_add(1, Ordering::Relaxed) + 1;
             // A line each time that the number has doubled: a flood of drops is no flood of lines.
@@ -168,8 +183,13 @@ impl Recorder {
 
 /// Writes until the end is announced; returns whether the sink closed without an error.
 fn write_all(mut sink: impl Sink, queue: &Receiver<Message>, counters: &Counters) -> bool {
-    while let Ok(Message::Exchange(exchange)) = queue.recv() {
-        match sink.write(&exchange, counters.dropped.load(Ordering::Relaxed)) {
+    loop {
+        let written = match queue.recv() {
+            Ok(Message::Exchange(exchange)) => sink.write(&exchange, counters.dropped.load(Ordering::Relaxed)),
+            Ok(Message::Audited(audited)) => sink.audited(&audited),
+            Ok(Message::End) | Err(_) => break,
+        };
+        match written {
             Ok(()) => {
                 counters.written.fetch_add(1, Ordering::Relaxed);
             }

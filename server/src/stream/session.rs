@@ -75,7 +75,7 @@ impl<F: Form> Session<F> {
         stopwatch.stage("prepare");
         let question = Question { request, budget: self.opening.shared.budget, times };
         let (request, prediction) = compute(&self.scene, question, workspace, stopwatch).map_err(of_pose)?;
-        metrics.predicted(request.level, stopwatch.finish());
+        metrics.predicted(&self.scene, &request, &prediction, stopwatch.finish());
         let micros = |time: Duration| time.as_nanos() as f64 / 1e3;
         let times = StreamTimes {
             received: micros(posed.received),

@@ -50,6 +50,24 @@ pub fn chosen(choice: Option<&SceneChoice>) -> Result<Scene, Problem> {
 /// A problem that names the field.
 pub fn scene(spec: &SceneSpec) -> Result<Scene, Problem> {
     let surface = spec.surface.as_ref().map_or(Ok(SceneSurface::Sphere { radius_mm: EYE_RADIUS.default }), surface)?;
+    on_surface(spec, surface)
+}
+
+/// As [`scene`], on the surface in a file that came beside the scene.
+///
+/// # Errors
+/// A problem that names the field.
+pub fn scene_on_file(spec: &SceneSpec, field: &str, bytes: &[u8], format: MeshFormat) -> Result<Scene, Problem> {
+    if let Some(surface) = &spec.surface {
+        let nothing_else = SurfaceSpec::of_kind(SurfaceKind::Mesh);
+        if *surface != nothing_else {
+            return Err(both("scene.surface", field));
+        }
+    }
+    on_surface(spec, SceneSurface::Mesh(Arc::new(mesh_file(field, bytes, format)?)))
+}
+
+fn on_surface(spec: &SceneSpec, surface: SceneSurface) -> Result<Scene, Problem> {
     if let (SceneSurface::Mesh(_), Some(_)) = (&surface, &spec.pose) {
         return Err(misplaced("scene.pose", "a mesh, which places its own patch"));
     }
@@ -98,7 +116,7 @@ fn surface(spec: &SurfaceSpec) -> Result<SceneSurface, Problem> {
 /// Refuses fields that do not belong to the kind: they would change nothing.
 fn refuse_misplaced(spec: &SurfaceSpec) -> Result<(), Problem> {
     use SurfaceKind::{FovealPit, Mesh, Sphere};
-    let fields: [(&str, bool, &[SurfaceKind]); 7] = [
+    let fields: [(&str, bool, &[SurfaceKind]); 8] = [
         ("radius_mm", spec.radius_mm.is_some(), &[Sphere, FovealPit]),
         ("depth_mm", spec.depth_mm.is_some(), &[FovealPit]),
         ("sigma_mm", spec.sigma_mm.is_some(), &[FovealPit]),
@@ -106,6 +124,7 @@ fn refuse_misplaced(spec: &SurfaceSpec) -> Result<(), Problem> {
         ("triangles", spec.triangles.is_some(), &[Mesh]),
         ("obj", spec.obj.is_some(), &[Mesh]),
         ("ply", spec.ply.is_some(), &[Mesh]),
+        ("stl", spec.stl.is_some(), &[Mesh]),
     ];
     let kind = match spec.kind {
         SurfaceKind::Flat => "flat",
@@ -122,16 +141,21 @@ fn refuse_misplaced(spec: &SurfaceSpec) -> Result<(), Problem> {
 }
 
 fn mesh(spec: &SurfaceSpec) -> Result<TriangleMesh, Problem> {
-    match (&spec.vertices_mm, &spec.triangles, &spec.obj, &spec.ply) {
+    let files = [
+        ("scene.surface.obj", &spec.obj, MeshFormat::Obj),
+        ("scene.surface.ply", &spec.ply, MeshFormat::Ply),
+        ("scene.surface.stl", &spec.stl, MeshFormat::Stl),
+    ];
+    let mut given = files.iter().filter_map(|(field, text, format)| Some((field, text.as_ref()?, format)));
+    match (&spec.vertices_mm, &spec.triangles, given.next(), given.next()) {
         (Some(vertices), Some(triangles), None, None) => indexed(vertices, triangles),
-        (None, None, Some(text), None) => file("scene.surface.obj", text, MeshFormat::Obj),
-        (None, None, None, Some(text)) => file("scene.surface.ply", text, MeshFormat::Ply),
+        (None, None, Some((field, text, format)), None) => mesh_file(field, text.as_bytes(), *format),
         _ => Err(Problem::field(
             Kind::InvalidRequest,
             "scene.surface",
             None,
-            "vertices_mm with triangles, or obj, or ply",
-            "a mesh is given as vertices_mm with triangles, or as obj, or as ply, and in one way only",
+            "vertices_mm with triangles, or obj, or ply, or stl",
+            "a mesh is given as vertices_mm with triangles, or as obj, or as ply, or as stl, and in one way only",
         )),
     }
 }
@@ -157,10 +181,9 @@ fn indexed(vertices: &[Vector], triangles: &[Triangle]) -> Result<TriangleMesh, 
     })
 }
 
-fn file(field: &str, text: &str, format: MeshFormat) -> Result<TriangleMesh, Problem> {
+fn mesh_file(field: &str, bytes: &[u8], format: MeshFormat) -> Result<TriangleMesh, Problem> {
     let allowed = "a triangle mesh in mm with a common outward side";
-    read_mesh(text.as_bytes(), format)
-        .map_err(|error| Problem::field(Kind::InvalidMesh, field, None, allowed, error.to_string()))
+    read_mesh(bytes, format).map_err(|error| Problem::field(Kind::InvalidMesh, field, None, allowed, error.to_string()))
 }
 
 fn tissue(spec: &TissueSpec) -> Tissue {

@@ -4,6 +4,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::scene::SceneSpec;
+use super::stored::{StoreEntry, StoredScene};
 
 /// `GET /v1/scenes`.
 #[derive(Serialize, ToSchema)]
@@ -12,6 +13,10 @@ pub struct SceneList {
     pub default: &'static str,
     /// The built-in scenes.
     pub scenes: Vec<SceneEntry>,
+    /// Scenes of one's own, by id; see `POST /v1/scenes`.
+    pub stored: Vec<StoredScene>,
+    /// Where those are kept.
+    pub store: StoreEntry,
     /// The patch that every scene reports.
     pub patch: PatchEntry,
     /// Every number of a scene with its default, its range and their source.
@@ -113,10 +118,23 @@ pub struct About {
     pub features: Vec<&'static str>,
     /// Names of the levels, cheapest first.
     pub levels: Vec<&'static str>,
+    /// The weights of the learned levels.
+    pub weights: Vec<WeightsEntry>,
     /// Names of the effects; their order is that of the bits in a binary answer.
     pub effects: Vec<&'static str>,
     /// What it allows.
     pub limits: AboutLimits,
+}
+
+/// The weights of a learned level.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct WeightsEntry {
+    /// The level.
+    pub level: &'static str,
+    /// SHA-256 of the file.
+    pub sha256: String,
+    /// Whether they were read; without, the level has no answer.
+    pub usable: bool,
 }
 
 /// What a service allows.

@@ -66,7 +66,7 @@ pub enum SurfaceKind {
 }
 
 /// The inner surface of the retina at rest. A field that does not belong to the kind is refused.
-#[derive(Clone, Debug, Deserialize, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 #[schema(example = json!({"kind": "foveal_pit", "radius_mm": 12.0, "depth_mm": 0.1, "sigma_mm": 0.25}))]
 pub struct SurfaceSpec {
@@ -93,6 +93,26 @@ pub struct SurfaceSpec {
     /// `mesh`: the text of an ASCII PLY file in mm, in place of `vertices_mm` and `triangles`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ply: Option<String>,
+    /// `mesh`: the text of an ASCII STL file in mm, in place of `vertices_mm` and `triangles`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stl: Option<String>,
+}
+
+impl SurfaceSpec {
+    /// A surface of that kind and nothing said of it.
+    pub fn of_kind(kind: SurfaceKind) -> Self {
+        Self {
+            kind,
+            radius_mm: None,
+            depth_mm: None,
+            sigma_mm: None,
+            vertices_mm: None,
+            triangles: None,
+            obj: None,
+            ply: None,
+            stl: None,
+        }
+    }
 }
 
 /// The layers of the eye wall, from the vitreous outwards.
