@@ -4,6 +4,7 @@ pub mod audit;
 pub mod cap;
 pub mod cost;
 pub mod held_out;
+pub mod http_load;
 pub mod igtl_client;
 pub mod laws;
 pub mod malformed;
