@@ -16,7 +16,7 @@ use retina_server::wire::request::SceneChoice;
 use retina_server::write::{Layout, write};
 use serde_json::{Value, json};
 
-use crate::harness::{Running, agent, request};
+use crate::harness::{Running, agent, request, runtime};
 
 #[test]
 fn a_full_queue_says_when_to_come_back() {
@@ -169,7 +169,7 @@ fn scenes_that_nobody_uses_make_room_and_used_ones_stay() {
         drop(scenes.get(Some(&sphere(10.0))));
         scenes.inline_bytes()
     };
-    let scenes = Scenes::new(2 * one + one / 2);
+    let scenes = scenes(2 * one + one / 2);
     let used = scenes.get(Some(&sphere(9.0))).expect("scene");
     for step in 0..8 {
         drop(scenes.get(Some(&sphere(10.0 + 0.1 * f64::from(step)))));

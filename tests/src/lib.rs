@@ -5,6 +5,7 @@ pub mod cap;
 pub mod cost;
 pub mod held_out;
 pub mod held_out_samples;
+pub mod http_load;
 pub mod igtl_client;
 pub mod laws;
 pub mod local_service;
