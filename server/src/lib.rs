@@ -3,8 +3,8 @@
 //! Read in this order: `routes` (every URL), `handlers`, `requests` (what each sets in motion), [`wire`] (every message), `understand` (from
 //! the wire to the core), `answer` (one request from bytes to bytes), `simulate` (one sequence, line by line), `batch` (many poses at once),
 //! [`stream`] (poses over a WebSocket), [`igtl`] (over OpenIGTLink), `kserve` (tensors), `admission` (who is let in), [`pool`] and [`scenes`] (where it runs and what is kept),
-//! [`library`] (scenes of one's own), [`page`] (what a browser sees). [`config`] is what the program can be told, [`problem`] how it says no, [`access`] who may ask, [`metrics`] what is
-//! counted, [`audit`] whether the promised accuracy is kept, `log` what is told of it all.
+//! [`library`] (scenes of one's own), [`page`] (what a browser sees). [`config`] is what the program can be told, [`problem`] how it says no, [`access`] who may ask,
+//! [`metrics`] what is counted, [`audit`] whether the promised accuracy is kept, `log` what is told of it all.
 //! [`recording`] is a guest that looks on, `review` compares levels for the eye.
 //!
 //! Not here: numerics, which are `retina_core`'s; this crate only brings questions to it and answers back.

@@ -169,7 +169,7 @@ fn scenes_that_nobody_uses_make_room_and_used_ones_stay() {
         drop(scenes.get(Some(&sphere(10.0))));
         scenes.inline_bytes()
     };
-    let scenes = Scenes::new(2 * one + one / 2);
+    let scenes = scenes(2 * one + one / 2);
     let used = scenes.get(Some(&sphere(9.0))).expect("scene");
     for step in 0..8 {
         drop(scenes.get(Some(&sphere(10.0 + 0.1 * f64::from(step)))));

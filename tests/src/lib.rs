@@ -6,6 +6,7 @@ pub mod cost;
 pub mod fuzzed;
 pub mod held_out;
 pub mod held_out_samples;
+pub mod http_load;
 pub mod igtl_client;
 pub mod laws;
 pub mod local_service;

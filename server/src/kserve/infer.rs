@@ -20,6 +20,7 @@ use crate::answer::{Question, compute};
 use crate::batch::piece_size;
 use crate::body::Received;
 use crate::pool::Ticket;
+use crate::problem::Problem;
 use crate::state::App;
 use crate::stopwatch::Stopwatch;
 
@@ -99,9 +100,10 @@ fn piece(
             let scene = app.scenes.get(Some(choice))?;
             let budget = Budget { level: Some(request.level), ..Budget::default() };
             let question = Question { request: request.clone(), budget, times: &app.times };
-            compute(&scene, question, workspace, &mut stopwatch).map(|answer| (scene, answer))
+            let (request, prediction) = compute(&scene, question, workspace, &mut stopwatch)?;
+            Ok::<_, Problem>((scene, request, prediction))
         };
-        let (scene, (request, prediction)) = answer().map_err(|problem| Refusal::from(problem).of_row(row))?;
+        let (scene, request, prediction) = answer().map_err(|problem| Refusal::from(problem).of_row(row))?;
         app.metrics.predicted(&scene, &request, &prediction, stopwatch.finish());
         columns.push(&asked.outputs, &prediction)?;
     }

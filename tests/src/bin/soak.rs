@@ -155,7 +155,7 @@ async fn streams(shared: Arc<Shared>) {
     let address = shared.url.trim_start_matches("http://").parse().expect("address");
     while shared.goes_on() {
         let streamed = async {
-            let mut client = StreamClient::connect(address).await?;
+            let mut client = StreamClient::connect(address).await.map_err(|error| error.to_string())?;
             client.open(json!({"accuracy": {"level": "linear"}, "format": "binary"})).await?;
             for sequence in 0..2000u64 {
                 let started = Instant::now();
@@ -164,7 +164,8 @@ async fn streams(shared: Arc<Shared>) {
                     .send(
                         &json!({"pose": {"sequence": sequence, "tip_mm": [x, 0.0, 0.0], "force_mn": [0.0, 0.0, -0.3]}}),
                     )
-                    .await?;
+                    .await
+                    .map_err(|error| error.to_string())?;
                 client.receive().await;
                 shared.saw("stream", 200, started.elapsed(), String::new);
                 if !shared.goes_on() {
@@ -172,10 +173,10 @@ async fn streams(shared: Arc<Shared>) {
                 }
                 tokio::time::sleep(POSE.saturating_sub(started.elapsed())).await;
             }
-            Ok::<_, tokio_tungstenite::tungstenite::Error>(())
+            Ok::<_, String>(())
         };
         if let Err(error) = streamed.await {
-            shared.saw("stream", 0, Duration::ZERO, || error.to_string());
+            shared.saw("stream", 0, Duration::ZERO, || error);
         }
     }
 }

@@ -1,0 +1,127 @@
+//! How many predictions a second the service gives over HTTP, and how long each takes: `cargo run --release -p retina-tests --bin http_load
+//! [-- LEVEL CONNECTIONS SECONDS TURNS]` (`network`, 8, 2, 5). On loopback, the service in this process as the program runs it.
+//!
+//! With `RETINA_PEERS_PYTHON` set to a Python that has `tests/comparison/fastapi/requirements.txt`, a FastAPI server around the paper's network is asked the same
+//! in turns with the service, so that what else runs on the machine meets both, and the ratio is printed.
+
+use std::net::{SocketAddr, TcpListener};
+use std::process::{Child, Command};
+use std::sync::mpsc::Sender;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use clap::Parser as _;
+use retina_core::comparison::quantile;
+use retina_server::config::CommandLine;
+use retina_server::{App, run};
+use retina_tests::http_load::{Client, Measured, measure, post};
+use serde_json::json;
+use tokio_util::sync::CancellationToken;
+
+/// Most connections, seconds and turns, so that no argument makes a run without end.
+const MOST: (usize, f64, usize) = (512, 60.0, 100);
+/// Requests that are told apart.
+const REQUESTS: usize = 256;
+/// The goal at level `network` with 8 connections: answers a second, p50 and p99 (ms).
+const GOAL: (f64, f64, f64) = (2000.0, 1.0, 3.0);
+/// How many times the requests a second of the FastAPI server are the goal.
+const TIMES: f64 = 20.0;
+/// How long the FastAPI server may take to start.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn main() {
+    let argument = |index: usize, usual: &str| std::env::args().nth(index).unwrap_or(usual.to_owned());
+    let level = argument(1, "network");
+    let connections = argument(2, "8").parse::<usize>().expect("CONNECTIONS").clamp(1, MOST.0);
+    let turn = Duration::from_secs_f64(argument(3, "2").parse::<f64>().expect("SECONDS").clamp(0.1, MOST.1));
+    let turns = argument(4, "5").parse::<usize>().expect("TURNS").clamp(1, MOST.2);
+    let (sender, receiver) = std::sync::mpsc::channel();
+    thread::spawn(move || serve(&sender));
+    let ours = receiver.recv().expect("address");
+    let theirs = std::env::var("RETINA_PEERS_PYTHON").ok().map(|python| FastApi::start(&python));
+
+    // A little elsewhere each time; both are asked the same.
+    let bodies: Vec<String> = (0..REQUESTS)
+        .map(|index| {
+            let x = 0.3 * (index as f64 * 0.618).fract() - 0.15;
+            json!({"needle": {"tip_mm": [x, -0.05, 0.0]}, "force_mn": [0.0, 0.0, -0.4], "accuracy": {"level": level}}).to_string()
+        })
+        .collect();
+    let requests = |address: SocketAddr| bodies.iter().map(|body| post(address, "/v1/predict", body)).collect::<Vec<_>>();
+    let ask = |address: SocketAddr| measure(address, &requests(address), connections, turn).expect("answers");
+    let (mut mine, mut other) = (Vec::new(), Vec::new());
+    for _ in 0..turns {
+        mine.push(ask(ours));
+        other.extend(theirs.as_ref().map(|theirs| ask(theirs.address)));
+    }
+    println!("{level}, {connections} connections, {turns} turns of {} s, medians over the turns", turn.as_secs_f64());
+    let told = |name: &str, turns: &[Measured]| {
+        let of = |pick: fn(&Measured) -> f64| {
+            let mut values: Vec<f64> = turns.iter().map(pick).collect();
+            values.sort_by(f64::total_cmp);
+            quantile(&values, 0.5)
+        };
+        let measured = Measured { per_second: of(|m| m.per_second), p50_ms: of(|m| m.p50_ms), p99_ms: of(|m| m.p99_ms) };
+        let Measured { per_second, p50_ms, p99_ms } = measured;
+        println!("{name}: {per_second:.0} answers a second; ms: p50 {p50_ms:.3}, p99 {p99_ms:.3}");
+        measured
+    };
+    let mine_told = told("the service", &mine);
+    let kept = mine_told.per_second >= GOAL.0 && mine_told.p50_ms <= GOAL.1 && mine_told.p99_ms <= GOAL.2;
+    println!("2000 a second with p50 of 1 ms and p99 of 3 ms or less: {}", if kept { "kept" } else { "not kept" });
+    if !other.is_empty() {
+        told("FastAPI", &other);
+        let mut ratios: Vec<f64> = mine.iter().zip(&other).map(|(mine, other)| mine.per_second / other.per_second).collect();
+        ratios.sort_by(f64::total_cmp);
+        let ratio = quantile(&ratios, 0.5);
+        let kept = if ratio >= TIMES { "kept" } else { "not kept" };
+        println!("times the answers of FastAPI, turn by turn: median {ratio:.1}, from {:.1} to {:.1}", ratios[0], ratios[ratios.len() - 1]);
+        println!("{TIMES} times: {kept}");
+    }
+}
+
+/// The service as the program runs it: one thread that talks, one for each core that computes.
+fn serve(bound: &Sender<SocketAddr>) {
+    let config = CommandLine::parse_from(["retina-server"]).config;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("runtime");
+    runtime.block_on(async {
+        let service = App::start(&config).expect("threads");
+        while service.ready().is_err() {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.expect("port");
+        bound.send(listener.local_addr().expect("address")).expect("main thread");
+        run(listener, service, CancellationToken::new()).await.expect("service");
+    });
+}
+
+/// A FastAPI server as a process; ends when dropped.
+struct FastApi {
+    process: Child,
+    address: SocketAddr,
+}
+
+impl FastApi {
+    fn start(python: &str) -> Self {
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/comparison/fastapi/server.py");
+        let free = TcpListener::bind("127.0.0.1:0").expect("port");
+        let address = free.local_addr().expect("address");
+        drop(free);
+        let process = Command::new(python).arg("-B").arg(script).arg(address.port().to_string()).spawn().expect("Python");
+        let server = Self { process, address };
+        let began = Instant::now();
+        while Client::connect(address).is_err() {
+            assert!(began.elapsed() < PATIENCE, "the FastAPI server does not start");
+            thread::sleep(Duration::from_millis(50));
+        }
+        server
+    }
+}
+
+impl Drop for FastApi {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
