@@ -9,6 +9,7 @@ pub mod igtl_client;
 pub mod laws;
 pub mod malformed;
 pub mod overload;
+pub mod paper_network;
 pub mod random_scene;
 pub mod search;
 pub mod stated_errors;
