@@ -59,7 +59,7 @@ fn the_server_and_its_models_tell_of_themselves() {
         assert_eq!(told.body["inputs"][0], json!({"name": "tip_mm", "datatype": "FP32", "shape": [-1, 3]}));
         assert_eq!(told.body["outputs"][0], json!({"name": "vertices_mm", "datatype": "FP32", "shape": [-1, 64, 3]}));
     }
-    for path in ["/v2/models/resnet", "/v2/models/retina-", "/v2/models/resnet/ready"] {
+    for path in ["/v2/models/resnet", "/v2/models/retina-", "/v2/models/resnet/ready", "/v2/models/%ff"] {
         let told = get(path);
         assert_eq!(told.status, StatusCode::NOT_FOUND, "{path}");
         assert!(told.body["error"].as_str().is_some_and(|error| error.contains("retina-network")), "{}", told.body);

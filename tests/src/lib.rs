@@ -13,6 +13,7 @@ pub mod local_service;
 pub mod malformed;
 pub mod overload;
 pub mod promise;
+pub mod paper_network;
 pub mod random_scene;
 pub mod search;
 pub mod spawned;

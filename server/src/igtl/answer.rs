@@ -11,7 +11,7 @@ use super::unit::{MICROMETRE, MILLIMETRE, MILLINEWTON};
 use crate::problem::{Kind, Problem};
 use crate::stream::binary::Head;
 use crate::stream::protocol::Form;
-use crate::wire::igtl::{IgtlAnswer, IgtlMessage, IgtlOpened};
+use crate::wire::igtl::{IgtlAnswer, IgtlMessage, IgtlOpened, IgtlProblem};
 use crate::wire::pose::PoseAnswer;
 use crate::wire::stream::OpenSpec;
 use crate::write::{Layout, write};
@@ -95,13 +95,14 @@ fn text_of(message: &IgtlMessage) -> Result<Vec<u8>, Problem> {
     Ok(compose::string(&text))
 }
 
-/// The messages of a problem: a STATUS with its cause, and its document as STRING.
-pub fn problem(stamp: &Stamp, problem: &Problem) -> Bytes {
+/// The messages of a problem, that of a pose where it has a number: a STATUS with its cause, and its document as STRING.
+pub fn problem(stamp: &Stamp, sequence: Option<u64>, dropped: u32, problem: &Problem) -> Bytes {
     let status = i64::from(problem.kind.status().as_u16());
     let content = compose::status(code(problem.kind), status, problem.kind.name(), &problem.detail);
     let mut bytes = encode(stamp, "STATUS", SERVICE, &content);
-    let document = serde_json::to_string(&problem.document()).unwrap_or_default();
-    bytes.extend(encode(stamp, "STRING", "Problem", &compose::string(&document)));
+    let document = IgtlProblem { sequence, dropped, document: problem.document() };
+    let text = serde_json::to_string(&document).unwrap_or_default();
+    bytes.extend(encode(stamp, "STRING", "Problem", &compose::string(&text)));
     bytes.into()
 }
 

@@ -194,8 +194,9 @@ impl Protocol for Conversation {
         taken.unwrap_or_else(Taken::Refused)
     }
 
-    fn problem(&self, about: Option<(&StreamPose, &Tag)>, _dropped: u32, told: &Problem) -> Bytes {
-        problem(&about.map_or(self.remark(), |(_, tag)| tag.stamp), told)
+    fn problem(&self, about: Option<(&StreamPose, &Tag)>, dropped: u32, told: &Problem) -> Bytes {
+        let stamp = about.map_or(self.remark(), |(_, tag)| tag.stamp);
+        problem(&stamp, about.map(|(pose, _)| pose.sequence), dropped, told)
     }
 
     fn knock(&self) -> Option<Bytes> {

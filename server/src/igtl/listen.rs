@@ -46,8 +46,9 @@ fn begin(mut socket: TcpStream, app: &AppState) {
     let (app, open) = (Arc::clone(app), app.streams.open.token());
     let Ok(place) = Arc::clone(&app.streams.places).try_acquire_owned() else {
         let busy = Problem::new(Kind::Busy, "As many streams as the service serves are open; try again in a second.");
+        let stamp = Stamp { version: 1, ..Stamp::default() };
         // A few bytes into the empty buffer of a new connection.
-        tokio::spawn(async move { socket.write_all(&problem(&Stamp { version: 1, ..Stamp::default() }, &busy)).await });
+        tokio::spawn(async move { socket.write_all(&problem(&stamp, None, 0, &busy)).await });
         return;
     };
     tokio::spawn(async move {

@@ -1,6 +1,7 @@
 //! The protocol's URLs.
 
 use axum::body::Body;
+use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -57,22 +58,33 @@ fn known(model: &str) -> Result<Level, Refusal> {
     })
 }
 
-async fn model(Path(model): Path<String>) -> Result<Response, Refusal> {
+/// A name that is not UTF-8 is none of ours either.
+fn named(model: Result<Path<String>, PathRejection>) -> String {
+    model.map_or_else(|_| String::new(), |Path(model)| model)
+}
+
+async fn model(model: Result<Path<String>, PathRejection>) -> Result<Response, Refusal> {
+    let model = named(model);
     known(&model)?;
     Ok(Json(metadata(&model)).into_response())
 }
 
-async fn model_ready(State(app): State<AppState>, Path(model): Path<String>) -> Result<Response, Refusal> {
+async fn model_ready(
+    State(app): State<AppState>,
+    model: Result<Path<String>, PathRejection>,
+) -> Result<Response, Refusal> {
+    let model = named(model);
     known(&model)?;
     Ok(readiness(&app, json!({"name": model})))
 }
 
 async fn inference(
     State(app): State<AppState>,
-    Path(model): Path<String>,
+    model: Result<Path<String>, PathRejection>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, Refusal> {
+    let model = named(model);
     let level = known(&model)?;
     if let Some(coding) = headers.get(header::CONTENT_ENCODING).filter(|coding| *coding != "identity") {
         let coding = String::from_utf8_lossy(coding.as_bytes()).into_owned();

@@ -10,6 +10,7 @@ use super::request::{AccuracySpec, ControlName, EffectsSpec, SceneChoice};
 use super::response::{AccuracyAnswer, ContactAnswer, NeedleAnswer};
 use super::stream::{ShapeSpec, StreamTimes};
 use crate::igtl::axes::Axes;
+use crate::problem::ProblemDocument;
 
 /// A text of the client: exactly one of the fields.
 #[derive(Debug, Deserialize)]
@@ -63,6 +64,19 @@ pub struct IgtlOpened<'a> {
     pub axes: Axes,
     /// Triangles between the points of every `Nodes`; empty for a mesh.
     pub triangles: &'a [[usize; 3]],
+}
+
+/// STRING `Problem`: the problem's document (RFC 9457) with two members more.
+#[derive(Serialize)]
+pub struct IgtlProblem<'a> {
+    /// Number of the TRANSFORM, where it was one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sequence: Option<u64>,
+    /// Those since the last answer that were overtaken.
+    pub dropped: u32,
+    /// What it is.
+    #[serde(flatten)]
+    pub document: ProblemDocument<'a>,
 }
 
 /// What the numbers of an answer do not say.

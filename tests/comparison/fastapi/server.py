@@ -23,7 +23,7 @@ try:
 except ImportError as error:
     raise SystemExit(f"{error}; see README.md") from error
 
-RADIUS_MM = 0.2575
+RADIUS_MM = 0.257
 REST_MM = network.rest_mm()
 TRIANGLES = network.patch_triangles()
 TRIANGLE_LIST = TRIANGLES.tolist()

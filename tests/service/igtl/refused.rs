@@ -51,7 +51,12 @@ fn what_is_wrong_is_a_status_with_its_cause_and_the_connection_goes_on() {
         client.send_bytes(&bytes).expect("sent");
         assert_eq!(refusal(&mut client), (code, field.to_owned()), "{name}");
     }
+    // The third TRANSFORM was read and has no answer: its problem has its number.
     open(&mut client, json!({"accuracy": {"level": "linear"}}));
+    client.send(&transform(UPRIGHT, [5.0, 0.0, 0.0])).expect("sent");
+    let document: Value =
+        serde_json::from_str(&client.until("Problem").expect("problem")["Problem"].text()).expect("JSON");
+    assert_eq!((&document["sequence"], &document["dropped"]), (&json!(3), &json!(0)));
     let told = press(&mut client, [0.0, 0.0, 0.0], [0.0, 0.0, -0.25]);
     assert!(told["Travel"].sensor().1[0] > 0.0);
 }

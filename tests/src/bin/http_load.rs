@@ -11,11 +11,13 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::Parser as _;
+use nalgebra::Vector3;
 use retina_core::comparison::quantile;
 use retina_server::config::CommandLine;
 use retina_server::{App, run};
 use retina_tests::http_load::{Client, Measured, measure, post};
-use serde_json::json;
+use retina_tests::paper_network::displacement_um;
+use serde_json::{Value, json};
 use tokio_util::sync::CancellationToken;
 
 /// Most connections, seconds and turns, so that no argument makes a run without end.
@@ -26,6 +28,8 @@ const REQUESTS: usize = 256;
 const GOAL: (f64, f64, f64) = (2000.0, 1.0, 3.0);
 /// How many times the requests a second of the FastAPI server are the goal.
 const TIMES: f64 = 20.0;
+/// Two evaluations of one network in 32 bits are no further apart than this (µm).
+const SAME_UM: f64 = 0.1;
 /// How long the FastAPI server may take to start.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -39,15 +43,22 @@ fn main() {
     thread::spawn(move || serve(&sender));
     let ours = receiver.recv().expect("address");
     let theirs = std::env::var("RETINA_PEERS_PYTHON").ok().map(|python| FastApi::start(&python));
+    if let Some(theirs) = &theirs {
+        let apart_um = apart_um(theirs.address);
+        println!("FastAPI's network and core's are {apart_um:.4} µm apart");
+        assert!(apart_um <= SAME_UM, "another network");
+    }
 
     // A little elsewhere each time; both are asked the same.
     let bodies: Vec<String> = (0..REQUESTS)
         .map(|index| {
             let x = 0.3 * (index as f64 * 0.618).fract() - 0.15;
-            json!({"needle": {"tip_mm": [x, -0.05, 0.0]}, "force_mn": [0.0, 0.0, -0.4], "accuracy": {"level": level}}).to_string()
+            json!({"needle": {"tip_mm": [x, -0.05, 0.0]}, "force_mn": [0.0, 0.0, -0.4], "accuracy": {"level": level}})
+                .to_string()
         })
         .collect();
-    let requests = |address: SocketAddr| bodies.iter().map(|body| post(address, "/v1/predict", body)).collect::<Vec<_>>();
+    let requests =
+        |address: SocketAddr| bodies.iter().map(|body| post(address, "/v1/predict", body)).collect::<Vec<_>>();
     let ask = |address: SocketAddr| measure(address, &requests(address), connections, turn).expect("answers");
     let (mut mine, mut other) = (Vec::new(), Vec::new());
     for _ in 0..turns {
@@ -61,7 +72,8 @@ fn main() {
             values.sort_by(f64::total_cmp);
             quantile(&values, 0.5)
         };
-        let measured = Measured { per_second: of(|m| m.per_second), p50_ms: of(|m| m.p50_ms), p99_ms: of(|m| m.p99_ms) };
+        let measured =
+            Measured { per_second: of(|m| m.per_second), p50_ms: of(|m| m.p50_ms), p99_ms: of(|m| m.p99_ms) };
         let Measured { per_second, p50_ms, p99_ms } = measured;
         println!("{name}: {per_second:.0} answers a second; ms: p50 {p50_ms:.3}, p99 {p99_ms:.3}");
         measured
@@ -71,11 +83,16 @@ fn main() {
     println!("2000 a second with p50 of 1 ms and p99 of 3 ms or less: {}", if kept { "kept" } else { "not kept" });
     if !other.is_empty() {
         told("FastAPI", &other);
-        let mut ratios: Vec<f64> = mine.iter().zip(&other).map(|(mine, other)| mine.per_second / other.per_second).collect();
+        let mut ratios: Vec<f64> =
+            mine.iter().zip(&other).map(|(mine, other)| mine.per_second / other.per_second).collect();
         ratios.sort_by(f64::total_cmp);
         let ratio = quantile(&ratios, 0.5);
         let kept = if ratio >= TIMES { "kept" } else { "not kept" };
-        println!("times the answers of FastAPI, turn by turn: median {ratio:.1}, from {:.1} to {:.1}", ratios[0], ratios[ratios.len() - 1]);
+        println!(
+            "times the answers of FastAPI, turn by turn: median {ratio:.1}, from {:.1} to {:.1}",
+            ratios[0],
+            ratios[ratios.len() - 1]
+        );
         println!("{TIMES} times: {kept}");
     }
 }
@@ -95,6 +112,20 @@ fn serve(bound: &Sender<SocketAddr>) {
     });
 }
 
+/// How far the server's answer to one request is from that of the same network in core, at the worst node (µm).
+fn apart_um(address: SocketAddr) -> f64 {
+    let body = json!({"needle": {"tip_mm": [0.12, -0.05, 0.0]}, "force_mn": [0.0, 0.1, -0.8]}).to_string();
+    let mut text = Vec::new();
+    let mut client = Client::connect(address).expect("connection");
+    let status = client.ask(&post(address, "/v1/predict", &body), &mut text).expect("answer");
+    assert_eq!(status, 200, "{}", String::from_utf8_lossy(&text));
+    let answer: Value = serde_json::from_slice(&text).expect("JSON");
+    let told: Vec<f64> = serde_json::from_value(answer["surface"]["displacement_um"].clone()).expect("numbers");
+    let core = displacement_um(0.12, -0.05, Vector3::new(0.0, 0.1, -0.8));
+    assert_eq!(told.len(), core.len());
+    told.iter().zip(core).map(|(told, core)| (told - core).abs()).fold(0.0, f64::max)
+}
+
 /// A FastAPI server as a process; ends when dropped.
 struct FastApi {
     process: Child,
@@ -107,7 +138,8 @@ impl FastApi {
         let free = TcpListener::bind("127.0.0.1:0").expect("port");
         let address = free.local_addr().expect("address");
         drop(free);
-        let process = Command::new(python).arg("-B").arg(script).arg(address.port().to_string()).spawn().expect("Python");
+        let process =
+            Command::new(python).arg("-B").arg(script).arg(address.port().to_string()).spawn().expect("Python");
         let server = Self { process, address };
         let began = Instant::now();
         while Client::connect(address).is_err() {
