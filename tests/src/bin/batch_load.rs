@@ -9,6 +9,7 @@ use clap::Parser as _;
 use retina_core::comparison::quantile;
 use retina_server::config::CommandLine;
 use retina_server::{App, run};
+use retina_tests::http_load::cpu_seconds;
 use serde_json::json;
 use tokio_util::sync::CancellationToken;
 
@@ -33,6 +34,7 @@ fn main() {
     let list: Vec<_> = (0..poses).map(pose).collect();
     let body = json!({"poses": list, "accuracy": {"level": level}}).to_string();
     let mut rates = Vec::with_capacity(batches);
+    let before = cpu_seconds();
     for _ in 0..batches {
         let started = Instant::now();
         let post = agent.post(format!("http://{address}/v1/predict/batch")).header("content-type", "application/json");
@@ -45,6 +47,10 @@ fn main() {
     }
     let at = |share: f64| quantile(&rates, share);
     println!("{level}, {batches} batches of {poses} poses, one after the other");
+    if let Some((after, before)) = cpu_seconds().zip(before) {
+        let each_us = 1e6 * (after - before) / (batches * poses) as f64;
+        println!("processor time of a prediction, service and client together: {each_us:.0} µs");
+    }
     println!("predictions a second: median {:.0}, p10 {:.0}, p90 {:.0}", at(0.5), at(0.1), at(0.9));
 }
 
