@@ -87,7 +87,7 @@ pub fn report(data: &Data, networks: Vec<Contact>, paper: Option<Faithful>) -> S
         if split == Split::Test {
             let _ = writeln!(
                 text,
-                "## Test split by scene, tip and needle: MAE / p99 µm\n\n{}",
+                "## Test split by scene, tip and needle: MAE / p99 µm / % of RMS displacement\n\n{}",
                 groups(&mut predictors, &samples, &mesh)
             );
         }

@@ -47,8 +47,10 @@ pub fn by_group(names: &[String], groups: &[(String, usize, f64, Vec<Errors>)]) 
     text.push_str(&"---|".repeat(names.len()));
     text.push('\n');
     for (group, samples, motion_um, errors) in groups {
-        let cells: Vec<String> =
-            errors.iter().map(|e| format!("{:.2} / {:.1}", e.mae_um(), e.node_quantile_um(0.99))).collect();
+        let cells: Vec<String> = errors
+            .iter()
+            .map(|e| format!("{:.2} / {:.1} / {:.1}", e.mae_um(), e.node_quantile_um(0.99), e.percent()))
+            .collect();
         let _ = writeln!(text, "| {group} | {samples} | {motion_um:.1} | {} |", cells.join(" | "));
     }
     text

@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use retina_core::comparison::quantile;
+use retina_tests::http_load::cpu_seconds;
 use retina_tests::local_service;
 use serde_json::json;
 
@@ -26,6 +27,7 @@ fn main() {
     let list: Vec<_> = (0..poses).map(pose).collect();
     let body = json!({"poses": list, "accuracy": {"level": level}}).to_string();
     let mut rates = Vec::with_capacity(batches);
+    let before = cpu_seconds();
     for _ in 0..batches {
         let started = Instant::now();
         let post = agent.post(format!("http://{address}/v1/predict/batch")).header("content-type", "application/json");
@@ -38,5 +40,9 @@ fn main() {
     }
     let at = |share: f64| quantile(&rates, share);
     println!("{level}, {batches} batches of {poses} poses, one after the other");
+    if let Some((after, before)) = cpu_seconds().zip(before) {
+        let each_us = 1e6 * (after - before) / (batches * poses) as f64;
+        println!("processor time of a prediction, service and client together: {each_us:.0} µs");
+    }
     println!("predictions a second: median {:.0}, p10 {:.0}, p90 {:.0}", at(0.5), at(0.1), at(0.9));
 }
