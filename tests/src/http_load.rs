@@ -101,7 +101,10 @@ pub fn measure(address: SocketAddr, requests: &[Vec<u8>], connections: usize, tu
     };
     let all: Vec<io::Result<Vec<f64>>> = thread::scope(|scope| {
         let clients: Vec<_> = (0..connections).map(|client| scope.spawn(move || one(client))).collect();
-        clients.into_iter().map(|client| client.join().unwrap_or_else(|_| Err(io::Error::other("a client panicked")))).collect()
+        clients
+            .into_iter()
+            .map(|client| client.join().unwrap_or_else(|_| Err(io::Error::other("a client panicked"))))
+            .collect()
     });
     let seconds = began.elapsed().as_secs_f64();
     let mut times_ms: Vec<f64> = all.into_iter().collect::<io::Result<Vec<_>>>()?.concat();

@@ -161,9 +161,13 @@ fn killed_at_any_moment_it_keeps_what_it_said_it_had_and_nothing_half() {
     let mut acknowledged = Vec::new();
     for round in 0..12 {
         let running = Spawned::start(program, &arguments).expect("program");
+        // While it warms up, everybody waits for the one thread.
+        while ureq::get(running.url("/readyz")).call().is_err() {
+            thread::sleep(Duration::from_millis(10));
+        }
         let url = running.url("");
         let storing = thread::spawn(move || store_until_killed(&url, 1000 * round));
-        thread::sleep(Duration::from_millis(random.u64(20..250)));
+        thread::sleep(Duration::from_millis(random.u64(20..400)));
         running.kill().expect("killed");
         acknowledged.extend(storing.join().expect("thread"));
     }
