@@ -33,7 +33,7 @@ pub struct CommandLine {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Answer requests over HTTP (the default).
-    Serve(Config),
+    Serve(Box<Config>),
     /// Answer one request from a file and end: the response goes to standard output, a problem to standard error.
     Predict(PredictArgs),
     /// Compare a level with the ground truth on random requests, for the rerun viewer (cargo feature `rerun`).

@@ -211,6 +211,8 @@ impl Library {
         let is_gone = |id: &Id| !there.iter().any(|(known, _)| known == id);
         let gone: Vec<Id> = self.entries().keys().copied().filter(is_gone).collect();
         gone.into_iter().for_each(|id| self.forget(id));
+        // A request may have brought one that was gone before anybody looked.
+        self.scenes.forget_all_but(&there.iter().map(|(id, _)| *id).collect::<Vec<_>>());
         Ok(there)
     }
 

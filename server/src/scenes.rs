@@ -93,6 +93,13 @@ impl Scenes {
         lock(&self.inline).entries.remove(id.to_string().as_bytes());
     }
 
+    /// Forgets the stored scenes that are not among these.
+    pub fn forget_all_but(&self, there: &[Id]) {
+        let is_gone = |id: Id| !there.contains(&id);
+        let stored = |key: &[u8]| std::str::from_utf8(key).ok().and_then(Id::parse);
+        lock(&self.inline).entries.retain(|key, _| !stored(key).is_some_and(is_gone));
+    }
+
     fn kept(&self, key: &[u8], scene: impl FnOnce() -> Result<Scene, Problem>) -> Result<Arc<PreparedScene>, Problem> {
         let slot = self.slot(key);
         let prepared = fill(&slot, scene);

@@ -39,7 +39,7 @@ impl Proxy {
             .map(|name| format!("{name}_temp_path {within}/{name};\n"))
             .concat();
         let whole = format!(
-            "daemon off;\nworker_processes 1;\npid {within}/pid;\nerror_log stderr error;\nevents {{}}\nhttp {{\naccess_log off;\n{paths}{conf}}}\n"
+            "daemon off;\nmaster_process off;\npid {within}/pid;\nerror_log stderr error;\nevents {{}}\nhttp {{\naccess_log off;\n{paths}{conf}}}\n"
         );
         let file = folder.join("nginx.conf");
         fs::write(&file, whole).expect("configuration");

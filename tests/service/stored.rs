@@ -77,7 +77,7 @@ fn a_scene_is_stored_once_prepared_used_listed_and_deleted() {
     let batch = json!({"scene": told["id"], "poses": [pose], "accuracy": {"level": "linear"}});
     let (status, answers) = call("POST", &service.url("/v1/predict/batch"), Some(&batch));
     assert!(status == 200 && answers["answers"][0]["prediction"].is_object(), "{answers}");
-    let steps = json!({"scene": told["id"], "needle": {"tip_mm": [0, 0, 0]}, "steps": [{"time_s": 1, "force_mn": [0, 0, -0.2]}], "accuracy": {"level": "linear"}});
+    let steps = json!({"scene": told["id"], "needle": {"tip_mm": [0, 0, 0]}, "steps": [{"time_s": 1, "force_mn": [0, 0, -0.2]}], "accuracy": {"level": "coarse"}});
     let (status, lines) = call("POST", &service.url("/v1/simulate"), Some(&steps));
     assert!(status == 200 && lines.as_str().is_some_and(|text| text.contains("\"end\"")), "{lines}");
 

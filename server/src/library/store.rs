@@ -127,8 +127,9 @@ impl Store {
     pub async fn remove(&self, id: Id) -> Result<bool, StoreError> {
         let key = self.key(id);
         // An object store takes away what is not there without a word.
-        if let Err(Failure::Missing) = within(self.objects.head(&key)).await {
-            return Ok(false);
+        match within(self.objects.head(&key)).await {
+            Err(Failure::Missing) => return Ok(false),
+            there => there.map(|_| ())?,
         }
         match within(self.objects.delete(&key)).await {
             Err(Failure::Missing) => Ok(false),
