@@ -12,7 +12,8 @@
 //! A connection begins with the session of `{"open": {}}`. An answer repeats the time stamp of its TRANSFORM (and in version 2 its message
 //! number) and is, by device name: POINT `Nodes` and POLYDATA `Surface` (with triangles, normals, and displacements in µm as scalars), TRANSFORM `NeedleTip` (the
 //! needle at equilibrium), SENSOR `Reaction` (mN), `Travel` (mm) and, where it is known, `ExpectedError` (µm: median, 95 %), at last STRING `Answer` (`wire::igtl::IgtlAnswer`).
-//! A problem is a STATUS with its cause and the STRING `Problem` with its document, because some clients read one of them only.
+//! A problem is a STATUS with its cause and the STRING `Problem` with its document, the pose's `sequence` and how many were `dropped`, because some clients
+//! read one of them only.
 //!
 //! Axes: OpenIGTLink says of no point which axes it is in, so the session does: `ras` (the default, 3D Slicer's own: the scene's axes are taken as
 //! right, anterior, superior) or `lps` (x and y the other way round); see [`axes`].
