@@ -17,6 +17,8 @@ pub(super) struct Attempt {
     globalization: Globalization,
     /// Newton iterations for each load step.
     max_iterations: usize,
+    /// Whether it goes on from the equilibrium of a load that is nearly this one, the factor at hand; the needle then need not wait for the tissue.
+    resumes: bool,
 }
 
 /// Residual relative to the force scale at which the first solve of a softened contact stops.
@@ -29,11 +31,16 @@ const ROUNDING: f64 = 1e-15;
 /// The same in a wall under pressure, over the force of the pressure on the whole surface.
 const SMALLEST_FORCE_SHARE: f64 = 1e-5;
 /// What is tried, in this order: directly from the given start, then from first touch in load steps.
-pub(super) const ATTEMPTS: [Attempt; 4] = [
-    Attempt { load_steps: 1, globalization: Globalization::PredictedStress, max_iterations: 45 },
-    Attempt { load_steps: 4, globalization: Globalization::PredictedStress, max_iterations: 30 },
-    Attempt { load_steps: 8, globalization: Globalization::PredictedStress, max_iterations: 30 },
-    Attempt { load_steps: 12, globalization: Globalization::LineSearch, max_iterations: 100 },
+const ATTEMPTS: [Attempt; 4] = [
+    Attempt { load_steps: 1, globalization: Globalization::PredictedStress, max_iterations: 45, resumes: false },
+    Attempt { load_steps: 4, globalization: Globalization::PredictedStress, max_iterations: 30, resumes: false },
+    Attempt { load_steps: 8, globalization: Globalization::PredictedStress, max_iterations: 30, resumes: false },
+    Attempt { load_steps: 12, globalization: Globalization::LineSearch, max_iterations: 100, resumes: false },
+];
+/// What is tried from an equilibrium nearby: with full steps from where it was left, and where they fail with a line search.
+pub(super) const REPETITIONS: [Attempt; 2] = [
+    Attempt { load_steps: 1, globalization: Globalization::PredictedStress, max_iterations: 45, resumes: true },
+    Attempt { load_steps: 1, globalization: Globalization::LineSearch, max_iterations: 100, resumes: false },
 ];
 /// Iterations of all attempts together: what takes more is a sharp edge that cuts its way in, where no load path of this model ends.
 const MOST_ITERATIONS: usize = 120;
@@ -157,10 +164,13 @@ impl Wall<'_> {
             force_scale_mn: scale,
             tolerance_mn: (tolerance * scale).max(light_mn),
             max_iterations: attempt.max_iterations.min(MOST_ITERATIONS.saturating_sub(*spent)),
-            held_iterations: HELD_ITERATIONS,
+            held_iterations: if attempt.resumes { 0 } else { HELD_ITERATIONS },
             max_travel_mm: MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
         };
-        let solved = system.solve(positions, drive, &settings, workspace, progress);
+        let solved = match attempt.resumes {
+            true => system.resume(positions, drive, &settings, workspace, progress),
+            false => system.solve(positions, drive, &settings, workspace, progress),
+        };
         *spent += solved.as_ref().map_or_else(NewtonError::iterations, |report| report.iterations);
         solved
     }

@@ -3,13 +3,13 @@
 //! It starts from the frictionless equilibrium. The pressures of the next round are a mix of those used and those found (Irons & Tuck 1969): where the
 //! force along the motion is shared between pressure and friction, each round answers the last one's error with one of the opposite sign, and plain repetition
 //! would diverge beyond µ tan(angle) = 1. The friction itself begins with a coefficient that rises and a wide stick zone that narrows from round to round, so that no solve has to find many points' way
-//! across it at once.
+//! across it at once. A round begins with the stiffness that the one before left, factorised, and ends as near to equilibrium as the pressures are to rest.
 //! Not here: the energy (`effects::friction`).
 
 use nalgebra::{Point3, Vector3};
 use thiserror::Error;
 
-use super::attempts::ATTEMPTS;
+use super::attempts::REPETITIONS;
 use super::{Addition, Equilibrium, Load, Wall};
 use crate::effect::{Effect, Local};
 use crate::effects::friction::{Friction, RubbingPoint, anchor};
@@ -22,8 +22,12 @@ pub const FULL_SLIP_MM: f64 = 5e-4;
 /// Change of the pressures from one round to the next, relative to their sum, at which they count as settled. Friction is off by no more than
 /// this share.
 pub const SETTLED: f64 = 1e-3;
-/// Residual relative to the force scale at which a round stops; the last one goes on to that of every solve.
-const ROUND_TOLERANCE: f64 = 1e-3;
+/// Residual relative to the force scale at which a round stops, between these: no nearer to equilibrium than a share of what the pressures still change from round
+/// to round, for the next round moves it again (the forcing term of an inexact Newton method: Dembo, Eisenstat & Steihaug 1982). The last one goes on to that of
+/// every solve.
+const ROUND_TOLERANCE: (f64, f64) = (1e-3, 0.03);
+/// That share.
+const FORCING: f64 = 0.1;
 /// Rounds before friction counts as not settling.
 const MAX_ROUNDS: usize = 60;
 /// Largest rise of the coefficient from one round to the next: what is held at once by a high friction is held wherever it happens to be.
@@ -106,7 +110,7 @@ impl Wall<'_> {
         let mut pressed = self.pressed(&found.positions);
         let (mut last_error, mut mix) = (Vec::new(), MIX.1);
         let mut widening = FIRST_WIDENING;
-        let mut tolerance = ROUND_TOLERANCE;
+        let mut tolerance = ROUND_TOLERANCE.1;
         let (mut change, mut last_change, mut cap) = (f64::INFINITY, f64::INFINITY, MIX.1);
         for round in 1..=MAX_ROUNDS {
             let reached = coefficient.min(round as f64 * COEFFICIENT_STEP);
@@ -133,6 +137,11 @@ impl Wall<'_> {
             if settling && last_error.len() == error.len() {
                 cap = if change > last_change { CALMING * cap } else { (HASTENING * cap).min(MIX.1) };
                 mix = next_mix(mix, &last_error, &error).min(cap);
+            }
+            if settling && tolerance > self.contact.tolerance {
+                // Pressures that do not come to rest are looked at closely.
+                let wanted = if change > last_change { 0.0 } else { FORCING * change };
+                tolerance = wanted.clamp(ROUND_TOLERANCE.0, ROUND_TOLERANCE.1);
             }
             last_change = change;
             for (used, e) in pressed.forces_mn.iter_mut().zip(&error) {
@@ -166,7 +175,7 @@ impl Wall<'_> {
         let drive = self.drive(load.motion, 1.0);
         let mut spent = 0;
         let mut failure = NewtonError::Interrupted { iterations: 0 };
-        for attempt in [&ATTEMPTS[0], &ATTEMPTS[ATTEMPTS.len() - 1]] {
+        for attempt in &REPETITIONS {
             let mut positions = found.positions.clone();
             let drive = (drive, tolerance);
             match self.newton(&self.contact, drive, load, attempt, &mut positions, &mut spent, workspace, progress) {

@@ -239,6 +239,27 @@ impl System<'_> {
         Ok(report)
     }
 
+    /// As [`System::solve`], from the answer of a system that is nearly this one: the factor that it left is used first, for as long as it pays.
+    ///
+    /// # Errors
+    /// [`NewtonError`].
+    pub fn resume(
+        &self,
+        positions: &mut [f64],
+        drive: Drive,
+        settings: &NewtonSettings,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<NewtonReport, NewtonError> {
+        let residual_mn = self.residual(positions, drive, workspace);
+        let mut report = NewtonReport { residual_mn, ..NewtonReport::default() };
+        while report.residual_mn > settings.tolerance_mn
+            && self.chord(positions, drive, settings, &mut report, workspace)?
+        {}
+        report += self.solve(positions, drive, settings, workspace, progress)?;
+        Ok(report)
+    }
+
     /// A step with the factor at hand, kept if it brings the residual down enough; whether it did.
     fn chord(
         &self,
