@@ -21,7 +21,7 @@
 //! Headers of version 1 and 2 are read and answered in the version that the client used last; metadata are skipped. Damaged and unknown
 //! messages are refused and the connection goes on; what can no longer be told apart ends it.
 //!
-//! Read `listen` (the connections), [`frame`] (bytes to messages), [`content`] and [`compose`] (what is in them), [`axes`], [`unit`], `conversation` (what they
+//! Read `listen` (the connections), [`frame`] (bytes to messages), [`content`] and [`compose`] (what is in them), [`axes`], [`mod@unit`], `conversation` (what they
 //! ask for), `answer` (what they are told). Pacing and sessions are `stream`'s.
 
 mod answer;
