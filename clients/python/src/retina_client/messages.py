@@ -18,6 +18,8 @@ class _AboutRequired(TypedDict):
     """Name of the program."""
     version: str
     """Its version."""
+    weights: List["WeightsEntry"]
+    """The weights of the learned levels."""
 
 
 class About(_AboutRequired, total=False):
@@ -215,6 +217,62 @@ ContactWord = Literal["clear", "touching", "slipping", "punctured"]
 
 ControlName = Literal["force", "pose"]
 """What is given about the needle's motion."""
+
+
+class CostCircumstances(TypedDict):
+    """What a measurement was made with."""
+    commit: str
+    """Commit of the program."""
+    processor: str
+    """The processor, of which one core was used."""
+    requests: int
+    """Requests of each panel."""
+    seed: int
+    """Seed of the requests."""
+    version: str
+    """Version of the program."""
+
+
+class CostPanel(TypedDict):
+    """Requests of one kind."""
+    caption: str
+    """What the requests have in common."""
+    floor_um: float
+    """Error of the truth itself: what refining it once more may move, µm, in the median."""
+    panel: str
+    """`default`, `hard` or `outside`."""
+    reference: "CostStanding"
+    """Level `reference`, its error being the floor."""
+    requests: int
+    """Requests that `reference` answered and the others were held against."""
+    standings: List["CostStanding"]
+    """The other levels and the settings that were tried."""
+
+
+class CostStanding(TypedDict):
+    """What the errors and times of a level or a setting come to. Errors are those of a request's worst node."""
+    failed: int
+    """Requests without an answer."""
+    knob: str
+    """`level`, or what was turned: `mesh`, `tolerance`, `contact`, `effects`."""
+    median_ms: float
+    """Time on one core: median over the requests, ms."""
+    median_um: float
+    """Error: median over the requests, µm."""
+    name: str
+    """The level or the setting."""
+    p99_ms: float
+    """Time on one core: 99 % of the requests take no longer, ms."""
+    p99_um: float
+    """Error: 99 % of the requests are no further off, µm."""
+
+
+class CostTable(TypedDict):
+    """`GET /v1/accuracy`: errors and times of levels and settings, over requests of three kinds."""
+    circumstances: "CostCircumstances"
+    """What the measurement was made with."""
+    panels: List["CostPanel"]
+    """One panel a kind of request."""
 
 
 class _EffectAnswerRequired(TypedDict):
@@ -587,6 +645,18 @@ class SceneEntry(TypedDict):
     """What it is."""
 
 
+class _SceneFormRequired(TypedDict):
+    mesh: str
+    """The bytes of a PLY, OBJ or STL file in mm; its name ends in .ply, .obj or .stl, or its media type says what it
+    is.
+    """
+
+
+class SceneForm(_SceneFormRequired, total=False):
+    """A scene as a form, for meshes as they lie on a disk."""
+    scene: Optional["SceneSpec"]
+
+
 class SceneList(TypedDict):
     """`GET /v1/scenes`."""
     default: str
@@ -597,6 +667,20 @@ class SceneList(TypedDict):
     """The patch that every scene reports."""
     scenes: List["SceneEntry"]
     """The built-in scenes."""
+    store: "StoreEntry"
+    """Where those are kept."""
+    stored: List["StoredScene"]
+    """Scenes of one's own, by id; see `POST /v1/scenes`."""
+
+
+class SceneProgress(TypedDict):
+    """How far the preparation is."""
+    done: int
+    """Steps that are done."""
+    of: int
+    """Steps in all."""
+    step: str
+    """What is being done: `waiting`, `read`, `linear` or `coarse`."""
 
 
 class SceneSpec(TypedDict, total=False):
@@ -613,6 +697,10 @@ class SceneSpec(TypedDict, total=False):
     """
     surface: Optional["SurfaceSpec"]
     tissue: Optional["TissueSpec"]
+
+
+SceneState = Literal["preparing", "ready", "failed", "corrupt"]
+"""How far a stored scene is."""
 
 
 class ShapeSpec(TypedDict, total=False):
@@ -723,6 +811,51 @@ class StepSurface(TypedDict):
     """Deformed nodes, mm."""
 
 
+class _StoreEntryRequired(TypedDict):
+    bytes: int
+    """What they take."""
+    durable: bool
+    """Whether they are still there when the service has ended and begun again; without `--scene-store` they are kept
+    in memory alone.
+    """
+    most_bytes: int
+    """What they may take together."""
+    most_bytes_each: int
+    """What one may take."""
+    most_scenes: int
+    """How many there may be."""
+    scenes: int
+    """How many there are."""
+
+
+class StoreEntry(_StoreEntryRequired, total=False):
+    """Where stored scenes are kept, and what room there is."""
+    unavailable: Optional[str]
+    """Why the place could not be asked just now; then the list is what was known before."""
+
+
+class _StoredSceneRequired(TypedDict):
+    bytes: int
+    """Size of what is stored; 0 for a built-in one."""
+    durable: bool
+    """Whether it is still there when the service has ended and begun again."""
+    id: str
+    """What a request writes as its `scene`: the SHA-256 of the scene with every number written out, or the name of a
+    built-in one.
+    """
+    state: "SceneState"
+    """How far it is. A scene that is being prepared can be used already; the first answers wait for it."""
+
+
+class StoredScene(_StoredSceneRequired, total=False):
+    """A scene that can be named, and how far it is."""
+    cause: Optional[str]
+    """`failed`, `corrupt`: why."""
+    progress: Optional["SceneProgress"]
+    surface: Optional["SurfaceSummary"]
+    touch: Optional["TouchSpec"]
+
+
 class StreamCommand(TypedDict, total=False):
     """A message of the client: exactly one of the fields."""
     open: Optional["OpenSpec"]
@@ -815,10 +948,25 @@ class SurfaceSpec(_SurfaceSpecRequired, total=False):
     """`sphere`, `foveal_pit`: radius of the eye at the inner surface, mm; 12 when left out."""
     sigma_mm: Optional[float]
     """`foveal_pit`: standard deviation of the pit's bell, mm; 0.25 when left out."""
+    stl: Optional[str]
+    """`mesh`: the text of an ASCII STL file in mm, in place of `vertices_mm` and `triangles`."""
     triangles: Optional[List["Triangle"]]
     """`mesh`: triangles, counter-clockwise seen from the vitreous."""
     vertices_mm: Optional[List["Vector"]]
     """`mesh`: vertices, scene frame, mm; together with `triangles`."""
+
+
+class _SurfaceSummaryRequired(TypedDict):
+    kind: "SurfaceKind"
+    """The kind."""
+
+
+class SurfaceSummary(_SurfaceSummaryRequired, total=False):
+    """What a surface is, in short."""
+    triangles: Optional[int]
+    """`mesh`: its triangles."""
+    vertices: Optional[int]
+    """`mesh`: its vertices."""
 
 
 class TimeAnswer(TypedDict):
@@ -855,9 +1003,35 @@ class TissueSpec(TypedDict, total=False):
     sclera: Optional["LayerSpec"]
 
 
+class TouchNeedle(TypedDict):
+    """A needle of the usual size."""
+    direction: "Vector"
+    """The way it points, scene frame."""
+    tip_mm: "Vector"
+    """Foremost point of the needle, scene frame, mm."""
+
+
+class TouchSpec(TypedDict):
+    """The part of a request that says where a needle presses."""
+    force_mn: "Vector"
+    """Its force on the tissue, scene frame, mN."""
+    needle: "TouchNeedle"
+    """The needle."""
+
+
 Triangle = List[int]
 """an array of 3 vertex indices from 0"""
 
 
 Vector = List[float]
 """an array of 3 numbers: x, y, z"""
+
+
+class WeightsEntry(TypedDict):
+    """The weights of a learned level."""
+    level: str
+    """The level."""
+    sha256: str
+    """SHA-256 of the file."""
+    usable: bool
+    """Whether they were read; without, the level has no answer."""
