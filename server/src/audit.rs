@@ -2,7 +2,7 @@
 //! against what they promised.
 //!
 //! Contract: never at the expense of an answer. One thread of its own, of the lowest priority, begins when no job waits or is at work and has not for
-//! [`QUIET`]; when any job comes, it stops at the next iteration and begins again later. What it cannot keep up with is dropped and counted.
+//! `QUIET`; when any job comes, it stops at the next iteration and begins again later. What it cannot keep up with is dropped and counted.
 //!
 //! Not here: what is counted (`metrics`), which level answers.
 

@@ -2,7 +2,7 @@
 //!
 //! Contract: a scene is there whole or not at all, whenever the program ends; what is there but is not what was given is told by name and never
 //! used. Several services may share a place: each sees what the others store or delete when it is asked for a list, and every
-//! [`LOOK_AGAIN`] besides. Preparation waits for the numerical threads as everybody does, one scene at a time and a step at a time.
+//! `LOOK_AGAIN` besides. Preparation waits for the numerical threads as everybody does, one scene at a time and a step at a time.
 //!
 //! Read `content` (what is stored, and its name), `store` (where), `quota`, `entry` (what is known of a scene), `touch` and `prepare` (what the
 //! background does), `reader` (how a request comes to a stored scene). Not here: the forms in which a scene is sent (`upload`).

@@ -1,7 +1,7 @@
 //! Where the contents of scenes lie: in memory, in a folder, or in an object store that several machines share.
 //!
 //! Contract: a content is there whole or not at all, whenever the program or the machine stops: in a folder it is written beside its place, brought to
-//! the disk and then renamed. What the place holds besides contents is not touched. Every call ends within [`PATIENCE`].
+//! the disk and then renamed. What the place holds besides contents is not touched. Every call ends within `PATIENCE`.
 //!
 //! Not here: what the contents mean (`content`), how many there may be (`quota`).
 
