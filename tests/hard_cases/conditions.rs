@@ -1,6 +1,6 @@
 //! Friction and pressure at the ends of their ranges, alone, together and with every other effect.
 //!
-//! Iterations: friction repeats the solve until the contact pressures settle, some 25 to 60 in all; a change of pressure in one step costs one or two more.
+//! Iterations: friction repeats the solve until the contact pressures settle, each time from the factor at hand and as far as the pressures are settled: some 10 to 60 in all; a change of pressure in one step costs one or two more.
 
 use retina_core::needle::NeedleShape;
 use retina_core::scene::Scene;
@@ -31,18 +31,18 @@ fn everything(coefficient: f64, to_mmhg: f64, strength_kpa: f64) -> Scene {
 
 const CASES: &[Case] = &[
     case("µ 0, leaning", || rough(0.0), || lean(ball(), 20.0, 40.0, 0.5), Answer(8)),
-    case("µ 0.015, leaning", || rough(0.015), || lean(ball(), 20.0, 40.0, 0.5), Answer(15)),
-    case("µ 0.5, leaning", || rough(0.5), || lean(ball(), 20.0, 40.0, 0.5), Answer(39)),
-    case("µ 2, leaning", || rough(2.0), || lean(ball(), 20.0, 40.0, 0.5), Answer(74)),
-    case("µ 2, straight", || rough(2.0), || push(ball(), 0.8), Answer(34)),
+    case("µ 0.015, leaning", || rough(0.015), || lean(ball(), 20.0, 40.0, 0.5), Answer(10)),
+    case("µ 0.5, leaning", || rough(0.5), || lean(ball(), 20.0, 40.0, 0.5), Answer(25)),
+    case("µ 2, leaning", || rough(2.0), || lean(ball(), 20.0, 40.0, 0.5), Answer(60)),
+    case("µ 2, straight", || rough(2.0), || push(ball(), 0.8), Answer(15)),
     case(
         "µ 2, 74° off the normal: pressure and friction hand the force to and fro",
         || rough(2.0),
         || lean(ball(), 30.0, 74.0, 0.1),
-        Refusal("the contact pressures did not settle in 60 rounds"),
+        Answer(75),
     ),
-    case("µ 0.2, 74° off the normal", || rough(0.2), || lean(ball(), 30.0, 74.0, 0.1), Answer(45)),
-    case("µ 2, flat tip on its edge", || rough(2.0), || lean(NeedleShape::flat(0.257), 30.0, 30.0, 0.3), Answer(84)),
+    case("µ 0.2, 74° off the normal", || rough(0.2), || lean(ball(), 30.0, 74.0, 0.1), Answer(34)),
+    case("µ 2, flat tip on its edge", || rough(2.0), || lean(NeedleShape::flat(0.257), 30.0, 30.0, 0.3), Answer(50)),
     case("µ 0.5, bevel, point first", || rough(0.5), || push(NeedleShape::bevelled(0.257), 0.05), Answer(8)),
     case("µ 2.1: the range ends", || rough(2.1), || push(ball(), 0.8), Refusal("friction_coefficient = 2.1")),
     case(
