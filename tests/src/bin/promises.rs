@@ -73,8 +73,10 @@ fn main() -> Result<(), Box<dyn Error>> {
                 }
                 let precise = Request { level: Level::Reference, ..drawn };
                 let truth = scene.predict_at(&precise, &TRUTH, &mut workspace, &mut Silent).ok();
-                let reply = post(&agent, address, &question)?;
-                let measured = truth.and_then(|truth| audited(index, promise, &reply, &truth.vertices));
+                let reply =
+                    post(&agent, address, &question).inspect_err(|said| bar.println(format!("{index}: {said}")));
+                let measured =
+                    truth.zip(reply.ok()).and_then(|(truth, reply)| audited(index, promise, &reply, &truth.vertices));
                 writeln!(journal, "{}", serde_json::to_string(&(index, &measured))?)?;
                 measured
             }
@@ -87,7 +89,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     bar.finish();
     println!(
-        "{requests} requests, seed {seed}; {refused} refused by every level and drawn again, {without} without a truth (`{NAME}`)\n\n{}",
+        "{requests} requests, seed {seed}; {refused} refused by every level and drawn again, {without} without an answer or a truth (`{NAME}`)\n\n{}",
         table(&all)
     );
     Ok(())
