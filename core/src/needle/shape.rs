@@ -62,6 +62,20 @@ pub enum Tip {
     },
 }
 
+impl Tip {
+    /// Number of kinds.
+    pub const KINDS: usize = 3;
+
+    /// Number of its kind: 0 half a ball, 1 flat, 2 bevelled.
+    pub fn kind(&self) -> usize {
+        match self {
+            Self::Hemispherical => 0,
+            Self::Flat { .. } => 1,
+            Self::Bevelled { .. } => 2,
+        }
+    }
+}
+
 /// Radius and tip of a needle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NeedleShape {

@@ -217,11 +217,6 @@ fn push_global(to: &mut Vec<f32>, input: &Input, frame: &ContactFrame) {
     let [retina_kpa, choroid_kpa, sclera_kpa] = input.tissue.youngs_modulus_kpa;
     let cross_section = std::f32::consts::PI * radius_mm * radius_mm;
     let pressure = (input.force_mn / (retina_kpa * cross_section)).max(1e-6);
-    let kind = |tip: &Tip| match tip {
-        Tip::Hemispherical => [1.0, 0.0, 0.0],
-        Tip::Flat { .. } => [0.0, 1.0, 0.0],
-        Tip::Bevelled { .. } => [0.0, 0.0, 1.0],
-    };
     let bevel = match input.shape.tip {
         Tip::Bevelled { angle_deg, .. } => (angle_deg / 90.0) as f32,
         Tip::Hemispherical | Tip::Flat { .. } => 1.0,
@@ -245,7 +240,7 @@ fn push_global(to: &mut Vec<f32>, input: &Input, frame: &ContactFrame) {
         retina_mm / yielding_mm,
         sclera_mm / yielding_mm,
     ]);
-    to.extend(kind(&input.shape.tip));
+    to.extend((0..Tip::KINDS).map(|kind| if input.shape.tip.kind() == kind { 1.0 } else { 0.0 }));
     to.extend([
         input.shape.edge_radius_mm() as f32 / radius_mm,
         bevel,

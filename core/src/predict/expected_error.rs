@@ -16,8 +16,8 @@ use crate::scene::Scene;
 pub const STRAIN_BINS: [f64; 5] = [0.05, 0.1, 0.2, 0.3, 0.45];
 /// Number of bins.
 pub const BINS: usize = STRAIN_BINS.len() + 1;
-/// Kinds of tip: half balls, flat ends, bevels.
-pub const TIPS: usize = 3;
+/// Kinds of tip, see [`Tip::kind`].
+pub const TIPS: usize = Tip::KINDS;
 
 /// What refinement may still change at level `reference`: this much (µm) or [`REFERENCE_SHARE`] of the depth, whichever is more.
 pub const REFERENCE_ERROR_UM: f64 = 0.5;
@@ -40,7 +40,7 @@ pub struct Quantiles {
 /// What is known of a request before a level computes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Situation {
-    /// Kind of the tip, see [`tip_kind`].
+    /// Kind of the tip, see [`Tip::kind`].
     pub tip: usize,
     /// Depth of the linear answer (µm).
     pub depth_um: f64,
@@ -72,15 +72,6 @@ impl ExpectedError {
     pub const UNKNOWN: Self = ExpectedError { median_um: f64::INFINITY, p95_um: f64::INFINITY, calibrated: false };
 }
 
-/// Number of a tip's kind, below [`TIPS`].
-pub fn tip_kind(tip: &Tip) -> usize {
-    match tip {
-        Tip::Hemispherical => 0,
-        Tip::Flat { .. } => 1,
-        Tip::Bevelled { .. } => 2,
-    }
-}
-
 /// Measured quantiles of `level`, where it has a table, under a kind of tip at a mean strain.
 pub fn quantiles(level: Level, tip: usize, strain: f64) -> Option<&'static Quantiles> {
     let table = match level {
@@ -101,7 +92,7 @@ impl Situation {
     pub fn new(scene: &Scene, shape: &NeedleShape, angle_deg: f64, depth_mm: f64, strain: f64) -> Self {
         let sampled = sampled::has_scene(scene) && sampled::has_needle(shape) && angle_deg <= sampled::ANGLE_DEG;
         Situation {
-            tip: tip_kind(&shape.tip),
+            tip: shape.tip.kind(),
             depth_um: depth_mm * 1e3,
             strain,
             sampled,

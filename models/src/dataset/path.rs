@@ -274,12 +274,13 @@ fn request(plan: &PathPlan, force_mn: f64, level: Level) -> Request {
 
 fn tip_shape(plan: &PathPlan) -> TipShape {
     let shape = &plan.needle.shape;
-    let (kind, bevel_deg) = match shape.tip {
-        Tip::Hemispherical => (0, 90.0),
-        Tip::Flat { .. } => (1, 90.0),
-        Tip::Bevelled { angle_deg, .. } => (2, angle_deg as f32),
-    };
-    TipShape { kind, radius_mm: shape.radius_mm as f32, edge_radius_mm: shape.edge_radius_mm() as f32, bevel_deg }
+    let bevel_deg = if let Tip::Bevelled { angle_deg, .. } = shape.tip { angle_deg as f32 } else { 90.0 };
+    TipShape {
+        kind: shape.tip.kind() as u8,
+        radius_mm: shape.radius_mm as f32,
+        edge_radius_mm: shape.edge_radius_mm() as f32,
+        bevel_deg,
+    }
 }
 
 fn tissue_numbers(plan: &PathPlan, thinning_mm: f64) -> TissueNumbers {

@@ -5,7 +5,6 @@
 
 use retina_core::comparison::quantile;
 use retina_core::equilibrium::ContactSettings;
-use retina_core::needle::Tip;
 use retina_core::predict::finite_element::{REFERENCE, Resolution};
 use retina_core::predict::{PredictError, PreparedScene};
 
@@ -69,11 +68,7 @@ pub fn compare(seed: u64, path: u32, scenes: &[u8]) -> Result<Vec<Comparison>, P
     let mut comparisons = Vec::new();
     let Some(plan) = plan(seed, path, scenes, Depths::Deep) else { return Ok(comparisons) };
     let prepared = PreparedScene::new(plan.scene.clone())?;
-    let tip = match plan.needle.shape.tip {
-        Tip::Hemispherical => 0,
-        Tip::Flat { .. } => 1,
-        Tip::Bevelled { .. } => 2,
-    };
+    let tip = plan.needle.shape.tip.kind();
     let meshes = [TRUTH, UNSOFTENED].map(|mesh| Path::new(&plan, &prepared, mesh));
     let [Ok(mut truth), Ok(mut reference)] = meshes else { return Ok(comparisons) };
     let mut memories = [PathMemory::default(), PathMemory::default()];

@@ -1,7 +1,5 @@
 //! How often what is promised about errors holds.
 
-use std::fmt::Write as _;
-
 use retina_core::network::input::Input;
 use retina_core::predict::{Level, expected_error};
 
@@ -18,50 +16,57 @@ pub fn coverage(networks: &mut [Contact], splits: &[(Split, Vec<(&Sample, Input)
     );
     for level in [Level::Linear, Level::Coarse] {
         for (split, samples) in splits {
-            text.push_str(&measured(level, *split, samples));
+            let mut tally = Tally::default();
+            for (sample, _) in samples {
+                let quantiles = expected_error::quantiles(level, usize::from(sample.tip.kind), strain(sample));
+                let (Some(quantiles), Some(worst_um)) = (quantiles, worst_um(sample, level)) else { continue };
+                let depth_um = f64::from(sample.linear_depth_mm) * 1e3;
+                tally.add(worst_um, [quantiles.median, quantiles.p95].map(|ratio| ratio * depth_um));
+            }
+            text.push_str(&tally.row(&format!("`{}`", level.name()), *split, None));
         }
     }
     for network in networks {
         for (split, samples) in splits {
-            let (mut below, mut bounds, mut known, mut count) = ([0.0; 2], Vec::new(), 0.0, 0.0);
+            let (mut tally, mut known) = (Tally::default(), 0.0);
             for (sample, input) in samples {
                 let Some(answer) = network.answer(input) else { continue };
                 let truth = describe::answer(&sample.truth).displacement_mm;
                 let off = answer.answer.displacement_mm.iter().zip(&truth).map(|(a, t)| (a - t).norm());
-                let worst = off.fold(0.0, f32::max);
-                for (below, bound) in below.iter_mut().zip(answer.error_mm) {
-                    *below += f64::from(u8::from(worst <= bound));
-                }
-                bounds.push(f64::from(answer.error_mm[1]) * 1e3);
+                let um = |mm: f32| f64::from(mm) * 1e3;
+                tally.add(um(off.fold(0.0, f32::max)), answer.error_mm.map(um));
                 known += f64::from(u8::from(answer.known));
-                count += 1.0;
             }
-            if count > 0.0 {
-                let [half, most] = below.map(|below| 100.0 * below / count);
-                let (name, bound, known) = (network.name(), quantile(&bounds, 0.5), 100.0 * known / count);
-                let _ =
-                    writeln!(text, "| {name} | {} | {half:.1} | {most:.1} | {bound:.2} | {known:.1} |", split.name());
-            }
+            text.push_str(&tally.row(&network.name(), *split, Some(known)));
         }
     }
     text
 }
 
-/// How often the measured quantiles of a level hold on other samples.
-fn measured(level: Level, split: Split, samples: &[(&Sample, Input)]) -> String {
-    let (mut below, mut bounds, mut count) = ([0.0; 2], Vec::new(), 0.0);
-    for (sample, _) in samples {
-        let quantiles = expected_error::quantiles(level, usize::from(sample.tip.kind), strain(sample));
-        let (Some(quantiles), Some(worst_um)) = (quantiles, worst_um(sample, level)) else { continue };
-        let ratio = worst_um / (f64::from(sample.linear_depth_mm) * 1e3);
-        below[0] += f64::from(u8::from(ratio <= quantiles.median));
-        below[1] += f64::from(u8::from(ratio <= quantiles.p95));
-        bounds.push(quantiles.p95 * f64::from(sample.linear_depth_mm) * 1e3);
-        count += 1.0;
+/// How many errors stay below their median and their 95 % bound.
+#[derive(Default)]
+struct Tally {
+    below: [f64; 2],
+    bounds_um: Vec<f64>,
+}
+
+impl Tally {
+    /// Adds the error of a worst node with its median and bound (µm).
+    fn add(&mut self, worst_um: f64, bounds_um: [f64; 2]) {
+        for (below, bound_um) in self.below.iter_mut().zip(bounds_um) {
+            *below += f64::from(u8::from(worst_um <= bound_um));
+        }
+        self.bounds_um.push(bounds_um[1]);
     }
-    if count == 0.0 {
-        return String::new();
+
+    /// The row of a table; nothing where nothing was added. `known` counts those that the answerer knows its way about.
+    fn row(&self, name: &str, split: Split, known: Option<f64>) -> String {
+        if self.bounds_um.is_empty() {
+            return String::new();
+        }
+        let percent = |number: f64| format!("{:.1}", 100.0 * number / self.bounds_um.len() as f64);
+        let [half, most] = self.below.map(percent);
+        let known = known.map_or("–".to_owned(), percent);
+        format!("| {name} | {} | {half} | {most} | {:.2} | {known} |\n", split.name(), quantile(&self.bounds_um, 0.5))
     }
-    let [half, most] = below.map(|below| 100.0 * below / count);
-    format!("| `{}` | {} | {half:.1} | {most:.1} | {:.2} | – |\n", level.name(), split.name(), quantile(&bounds, 0.5))
 }

@@ -119,11 +119,7 @@ impl StandIn {
             rest_mm: field(patch.vertices.iter().map(|vertex| vertex.coords)),
             rest_normal: field(vertex_normals(&patch.vertices, &patch.triangles).into_iter()),
             tip: TipShape {
-                kind: match tip {
-                    Tip::Hemispherical => 0,
-                    Tip::Flat { .. } => 1,
-                    Tip::Bevelled { .. } => 2,
-                },
+                kind: tip.kind() as u8,
                 radius_mm: request.needle.shape.radius_mm as f32,
                 edge_radius_mm: request.needle.shape.edge_radius_mm() as f32,
                 bevel_deg: if let Tip::Bevelled { angle_deg, .. } = tip { angle_deg as f32 } else { 90.0 },

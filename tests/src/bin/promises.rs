@@ -16,7 +16,7 @@ use retina_core::scene::Scene;
 use retina_core::working_range::WorkingRange;
 use retina_models::dataset::truth::{NAME, TRUTH};
 use retina_tests::local_service;
-use retina_tests::promise::question::{asked, body, request};
+use retina_tests::promise::question::{asked, body};
 use retina_tests::promise::reply::{Audited, audited, post};
 use retina_tests::promise::tally::table;
 
@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for index in 0..requests {
         let (scene, range) = (&scenes[index % scenes.len()], &mut ranges[index % scenes.len()]);
         let drawn = loop {
-            let drawn = request(range);
+            let drawn = range.request(Level::Linear);
             if scene.predict(&drawn, &mut workspace, &mut Silent).is_ok() {
                 break drawn;
             }

@@ -1,18 +1,15 @@
 //! A random request of the working range with a random promise.
 
-use retina_core::predict::{Control, Level, Request};
-use retina_core::working_range::WorkingRange;
+use retina_core::needle::Tip;
+use retina_core::needle::shaft::STIFFNESS;
+use retina_core::predict::{Control, Request};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-
-use retina_core::needle::Tip;
 
 /// Smallest and largest error that is asked for (µm).
 const ERRORS_UM: [f64; 2] = [1.0, 50.0];
 /// Shortest and longest time that is asked for (ms).
 const TIMES_MS: [f64; 2] = [0.3, 60.0];
-/// A shaft that does not bend (mN/mm): the truth knows no other.
-const RIGID_MN_PER_MM: f64 = 1e6;
 
 /// What is asked for beside the needle and the force.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,11 +31,6 @@ pub fn asked(random: &mut fastrand::Rng) -> Asked {
     }
 }
 
-/// The next request of the range; whether it has an answer is for the caller to see.
-pub fn request(range: &mut WorkingRange) -> Request {
-    range.request(Level::Linear)
-}
-
 /// The request as it is posted.
 pub fn body(scene: &str, request: &Request, asked: Asked) -> Value {
     let needle = &request.needle;
@@ -56,7 +48,8 @@ pub fn body(scene: &str, request: &Request, asked: Asked) -> Value {
             "tip_mm": needle.tip_mm.coords.as_slice(),
             "orientation_xyzw": needle.orientation.coords.as_slice(),
             "radius_mm": radius_mm,
-            "stiffness_mn_per_mm": RIGID_MN_PER_MM,
+            // On the wire a rigid shaft is one of the largest stiffness; the truth knows no other.
+            "stiffness_mn_per_mm": STIFFNESS.max,
             "tip": tip,
         },
         "accuracy": asked,
