@@ -20,8 +20,12 @@ const SKIP: u32 = u32::MAX;
 pub struct Dofs {
     /// For each vertex and component: number of the free unknown, `BORDER + k` or `FIXED`.
     of: Vec<u32>,
+    /// For each unknown of the tail, then of the border: its place among the positions.
+    tail_positions: Vec<usize>,
     /// Number of free unknowns.
     pub free: usize,
+    /// Of them, how many at the end are condensed to ([`Dofs::condensed_to`]).
+    pub tail: usize,
 }
 
 impl Dofs {
@@ -48,7 +52,31 @@ impl Dofs {
                 of[3 * vertex + component] = BORDER + component as u32;
             }
         }
-        Dofs { of, free: free as usize }
+        Dofs { of, tail_positions: Vec::new(), free: free as usize, tail: 0 }
+    }
+
+    /// The same with the last `tail` free unknowns apart: effects on vertices whose unknowns are all among them are a small problem of their own once the
+    /// others are eliminated (`solve::condensed`).
+    pub fn condensed_to(self, tail: usize) -> Self {
+        let mut tail_positions = vec![usize::MAX; tail + 3];
+        for at in 0..self.of.len() {
+            if let Some(index) = self.index(at / 3, at % 3).and_then(|index| index.checked_sub(self.free - tail)) {
+                tail_positions[index] = at;
+            }
+        }
+        Dofs { tail, tail_positions, ..self }
+    }
+
+    /// Adds `step` (unknowns of the tail, then of the border) to the positions.
+    pub(crate) fn advance_tail(&self, positions: &mut [f64], step: &[f64]) {
+        for (&at, step) in self.tail_positions.iter().zip(step) {
+            positions[at] += step;
+        }
+    }
+
+    /// Number of an unknown of the tail or of the border within the tail; `None` for any other and for what is fixed.
+    pub(crate) fn in_tail(&self, vertex: usize, component: usize) -> Option<usize> {
+        self.index(vertex, component)?.checked_sub(self.free - self.tail)
     }
 
     /// Index of a (vertex, component) in a vector of free unknowns followed by the three of the border; `None` if fixed.
@@ -81,6 +109,8 @@ pub struct Pattern {
     pub rows: Vec<u32>,
     /// For each stencil set: destination of the lower-triangle entries of each group's Hessian, row by row.
     destinations: Vec<Vec<u32>>,
+    /// For each stencil set: the groups whose unknowns are all in the tail or the border.
+    tail_groups: Vec<Vec<usize>>,
 }
 
 impl Pattern {
@@ -138,7 +168,12 @@ impl Pattern {
                 list
             })
             .collect();
-        Pattern { free, column_starts, rows, destinations }
+        let in_tail = |&dof: &u32| dof >= BORDER || dof as usize >= free - dofs.tail;
+        let tail_groups = stencils
+            .iter()
+            .map(|set| (0..set.len()).filter(|&group| locals(set, group).iter().all(in_tail)).collect())
+            .collect();
+        Pattern { free, column_starts, rows, destinations, tail_groups }
     }
 
     /// Number of stored entries of the sparse lower triangle.
@@ -216,16 +251,117 @@ fn for_each_active(
     scratch: &mut Scratch,
     mut visit: impl FnMut(usize, &Term, &Local, &mut Vec<f64>, &mut Vec<f64>),
 ) {
-    let Scratch { positions: current, other, hessian } = scratch;
     for (index, term) in terms.iter().enumerate() {
-        current.resize(3 * term.stencils.group_size, 0.0);
-        for group in 0..term.stencils.len() {
-            term.stencils.gather(group, positions, current);
-            let local = Local { current, group, predicted: predicted.of(index, group, term.effect.predicted_len()) };
-            if term.effect.is_active(&local) {
-                visit(index, term, &local, other, hessian);
-            }
+        let groups = 0..term.stencils.len();
+        visit_active(index, term, groups, positions, predicted, scratch, &mut visit);
+    }
+}
+
+/// The same for the groups of `term` that are given.
+fn visit_active(
+    index: usize,
+    term: &Term,
+    groups: impl Iterator<Item = usize>,
+    positions: &[f64],
+    predicted: &Predicted,
+    scratch: &mut Scratch,
+    visit: &mut impl FnMut(usize, &Term, &Local, &mut Vec<f64>, &mut Vec<f64>),
+) {
+    let Scratch { positions: current, other, hessian } = scratch;
+    current.resize(3 * term.stencils.group_size, 0.0);
+    for group in groups {
+        term.stencils.gather(group, positions, current);
+        let local = Local { current, group, predicted: predicted.of(index, group, term.effect.predicted_len()) };
+        if term.effect.is_active(&local) {
+            visit(index, term, &local, other, hessian);
         }
+    }
+}
+
+/// The effects on the tail alone: those groups whose unknowns are all in the tail of `dofs` or in the border. Vectors and matrices count the tail's unknowns, then
+/// the border's three.
+#[derive(Clone, Copy)]
+pub(crate) struct Tail<'a> {
+    pub terms: &'a [Term<'a>],
+    pub dofs: &'a Dofs,
+    pub pattern: &'a Pattern,
+}
+
+impl Tail<'_> {
+    fn for_each_active(
+        &self,
+        positions: &[f64],
+        predicted: &Predicted,
+        scratch: &mut Scratch,
+        mut visit: impl FnMut(usize, &Term, &Local, &mut Vec<f64>, &mut Vec<f64>),
+    ) {
+        for (index, term) in self.terms.iter().enumerate() {
+            let groups = self.pattern.tail_groups[term.set].iter().copied();
+            visit_active(index, term, groups, positions, predicted, scratch, &mut visit);
+        }
+    }
+
+    /// Their energy (µJ).
+    pub fn energy(&self, positions: &[f64], scratch: &mut Scratch) -> f64 {
+        let mut total = 0.0;
+        self.for_each_active(positions, &Predicted::default(), scratch, |_, term, local, _, _| {
+            total += term.effect.energy(local);
+        });
+        total
+    }
+
+    /// Their gradient (mN).
+    pub fn gradient(&self, positions: &[f64], scratch: &mut Scratch) -> Vec<f64> {
+        let mut out = vec![0.0; self.dofs.tail + 3];
+        self.for_each_active(positions, &Predicted::default(), scratch, |_, term, local, forces, _| {
+            let n = term.stencils.group_size;
+            forces.clear();
+            forces.resize(3 * n, 0.0);
+            term.effect.add_gradient(local, forces);
+            for (at, index) in self.unknowns(term, local.group).into_iter().enumerate() {
+                if let Some(index) = index {
+                    out[index] += forces[at];
+                }
+            }
+        });
+        out
+    }
+
+    /// Their Hessian (mN/mm), row by row, the lower triangle.
+    pub fn hessian(&self, positions: &[f64], predicted: &Predicted, scratch: &mut Scratch, out: &mut Vec<f64>) {
+        let size = self.dofs.tail + 3;
+        out.clear();
+        out.resize(size * size, 0.0);
+        self.for_each_active(positions, predicted, scratch, |_, term, local, _, matrix| {
+            let n = 3 * term.stencils.group_size;
+            matrix.clear();
+            matrix.resize(n * n, 0.0);
+            term.effect.add_hessian(local, matrix);
+            let unknowns = self.unknowns(term, local.group);
+            for (at, row) in unknowns.iter().enumerate() {
+                for (value, column) in matrix[at * n..=at * n + at].iter().zip(&unknowns) {
+                    if let (Some(row), Some(column)) = (row, column) {
+                        out[row.max(column) * size + row.min(column)] += value;
+                    }
+                }
+            }
+        });
+    }
+
+    /// Replaces the stresses of these effects in `predicted` by those at `positions`.
+    pub fn keep_stresses(&self, positions: &[f64], scratch: &mut Scratch, predicted: &mut Predicted) {
+        self.for_each_active(positions, &Predicted::default(), scratch, |index, term, local, moved, _| {
+            let len = term.effect.predicted_len();
+            moved.clear();
+            moved.resize(3 * term.stencils.group_size, 0.0);
+            term.effect.predict_stress(local, moved, &mut predicted.terms[index][local.group * len..][..len]);
+        });
+    }
+
+    /// Number within the tail of each unknown of a group, component-major; `None` for what is fixed.
+    fn unknowns(&self, term: &Term, group: usize) -> Vec<Option<usize>> {
+        let vertices = term.stencils.group(group);
+        (0..3).flat_map(|k| vertices.iter().map(move |&vertex| self.dofs.in_tail(vertex as usize, k))).collect()
     }
 }
 

@@ -2,6 +2,7 @@
 //! method on top of it.
 
 mod border;
+mod condensed;
 pub mod globalization;
 pub mod newton;
 pub mod sparse;

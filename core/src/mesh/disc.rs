@@ -50,6 +50,11 @@ impl DiscTopology {
         self.rings > 0 && point >= self.points() - self.around()
     }
 
+    /// Whether a lattice point lies in the core or on its first `rings` rings, and not on the rim.
+    pub fn is_within(&self, point: usize, rings: usize) -> bool {
+        point < self.core_side().pow(2) + self.around() * rings * ORDER && !self.is_rim(point)
+    }
+
     /// Lattice index of the core's outline at position `step` (counter-clockwise from the corner (−1, −1)).
     fn outline(&self, step: usize) -> usize {
         let last = self.core_side() - 1;

@@ -39,6 +39,9 @@ impl WallDivision {
     }
 }
 
+/// Rings around the core whose inner surface the needle is expected to touch: numbered last, so that what touches can be solved for on its own.
+const TOUCHED_RINGS: usize = 2;
+
 /// A mesh that could not be made.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum WallError {
@@ -135,15 +138,23 @@ impl WallTopology {
         }
         let mut vertices = Vec::new();
         let mut index = HashMap::new();
+        let top = layers.len() * ORDER + usize::from(layers.len() > below);
+        let mut touched = Vec::new();
         for point in nested_dissection(&disc) {
             let mut levels = used.remove(&point).unwrap_or_default();
             levels.sort_unstable();
             levels.dedup();
             for level in levels {
-                index.insert((point, level), vertices.len());
-                vertices.push((point, level));
+                if level == top && disc.is_within(point, TOUCHED_RINGS) {
+                    touched.push((point, level));
+                } else {
+                    vertices.push((point, level));
+                }
             }
         }
+        let tail = 3 * touched.len();
+        vertices.append(&mut touched);
+        index.extend(vertices.iter().enumerate().map(|(vertex, &place)| (place, vertex)));
         let needle = vertices.len();
 
         let mut elements = Stencils { group_size: NODES, vertices: Vec::new() };
@@ -170,7 +181,7 @@ impl WallTopology {
             }
         }
         let fixed = |vertex: usize, _| vertices[vertex].1 == 0 || disc.is_rim(vertices[vertex].0);
-        let dofs = Dofs::new(needle + 1, 0..needle, fixed, Some(needle));
+        let dofs = Dofs::new(needle + 1, 0..needle, fixed, Some(needle)).condensed_to(tail);
         let tip = Stencils { group_size: 1, vertices: vec![needle as u32] };
         let mut sets = vec![&elements, &faces, &tip];
         if !interface.is_empty() {

@@ -47,6 +47,8 @@ pub(super) struct Step {
     pub number: usize,
     /// Whether the Hessian was changed to be positive definite.
     pub weakened: bool,
+    /// Whether it meets the effects on the tail as they are at its end.
+    pub refined: bool,
 }
 
 /// Factor by which the diagonal shift grows until the factorisation succeeds.
@@ -79,6 +81,11 @@ const SUFFICIENT_DECREASE: f64 = 1e-4;
 const ENERGY_ROUNDOFF: f64 = 1e-11;
 
 impl Trial {
+    /// The stresses of the next Hessian.
+    pub fn predicted(&self) -> &Predicted {
+        &self.predicted
+    }
+
     pub fn new(
         system: &System,
         positions: &[f64],
@@ -223,6 +230,9 @@ impl System<'_> {
             trial.moved.fill(0.0);
             self.dofs.advance(&mut trial.moved, &step.step, scale);
             predict_stress(self.terms, &before, &trial.moved, &mut workspace.scratch, &mut trial.predicted);
+            if step.refined && halvings == 0 {
+                self.keep_tail_stresses(positions, &mut trial.predicted, workspace);
+            }
             return Some((halvings, residual_mn));
         }
         None

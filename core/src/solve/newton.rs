@@ -19,6 +19,7 @@ use thiserror::Error;
 
 pub use super::border::Drive;
 use super::border::Reduced;
+use super::condensed::Condensed;
 pub use super::globalization::Globalization;
 use super::globalization::{Step, Trial};
 use super::sparse::{Factor, LinearSolveError, SymbolicFactor, norm};
@@ -147,8 +148,9 @@ pub struct System<'a> {
 pub struct Workspace {
     pub(super) factor: Factor,
     pub(super) values: Vec<f64>,
-    residual: Vec<f64>,
+    pub(super) residual: Vec<f64>,
     pub(super) scratch: Scratch,
+    pub(super) condensed: Condensed,
 }
 
 impl Workspace {
@@ -159,6 +161,7 @@ impl Workspace {
             values: vec![0.0; pattern.len()],
             residual: vec![0.0; pattern.free + 3],
             scratch: Scratch::default(),
+            condensed: Condensed::default(),
         }
     }
 }
@@ -223,14 +226,20 @@ impl System<'_> {
             let weakened = self.factorize_definite(positions, &mut trial, workspace)?;
             report.shifts += weakened;
             let limit = if report.iterations < settings.held_iterations { 0.0 } else { settings.max_travel_mm };
-            let (step, slope) = self.step(drive, limit, workspace)?;
+            let (mut step, mut slope) = self.step(drive, limit, workspace)?;
             report.iterations += 1;
-            let step = Step { step, slope, number: report.iterations, weakened: weakened > 0 };
+            self.condense(positions, trial.predicted(), workspace);
+            let refined = self.refine(positions, &mut step, drive, limit, workspace)?;
+            if refined {
+                slope = self.slope(&step, drive, workspace);
+            }
+            let step = Step { step, slope, number: report.iterations, weakened: weakened > 0, refined };
             let taken = self.advance(positions, &step, &mut trial, workspace);
             let stuck = NewtonError::NoStep { iterations: report.iterations, residual_mn: report.residual_mn };
             let (halvings, residual_mn) = taken.ok_or(stuck)?;
             report.halvings += halvings;
             report.residual_mn = residual_mn;
+            if std::env::var_os("TRACE").is_some() { eprintln!("  it {} rel {:.2e} halv {} weak {} ref {}", report.iterations, residual_mn / settings.force_scale_mn, halvings, weakened, refined); }
             while report.residual_mn > settings.tolerance_mn
                 && report.residual_mn < CHORD_BELOW * settings.force_scale_mn
                 && self.chord(positions, drive, settings, &mut report, workspace)?
@@ -270,10 +279,12 @@ impl System<'_> {
         workspace: &mut Workspace,
     ) -> Result<bool, NewtonError> {
         let before = positions.to_vec();
-        let (step, _) = self.step(drive, settings.max_travel_mm, workspace)?;
+        let (mut step, _) = self.step(drive, settings.max_travel_mm, workspace)?;
+        self.refine(&before, &mut step, drive, settings.max_travel_mm, workspace)?;
         self.dofs.advance(positions, &step, 1.0);
         let residual_mn = self.residual(positions, drive, workspace);
         report.chords += 1;
+        if std::env::var_os("TRACE").is_some() { eprintln!("    chord rel {:.2e}", residual_mn / settings.force_scale_mn); }
         // Not a number is not smaller either.
         let pays = residual_mn <= CHORD_REDUCTION * report.residual_mn;
         if pays {
@@ -329,6 +340,15 @@ impl System<'_> {
         let moved: Vector3<f64> = directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
         step.extend(moved.iter());
         Ok((step, slope.min(0.0)))
+    }
+
+    /// The slope of the potential along `step`.
+    fn slope(&self, step: &[f64], drive: Drive, workspace: &Workspace) -> f64 {
+        let free = self.dofs.free;
+        let residual = &workspace.residual;
+        let moved = Vector3::from_row_slice(&step[free..]);
+        let held = Vector3::from_row_slice(&residual[free..]).dot(&moved) - drive.work(&moved);
+        (step[..free].iter().zip(residual).map(|(s, r)| s * r).sum::<f64>() + held).min(0.0)
     }
 
     fn bad_start(&self, positions: &[f64], scratch: &mut Scratch) -> NewtonError {

@@ -7,10 +7,11 @@ use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side, Spec};
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
+use faer::{Conj, Mat, MatMut, Par, Side, Spec};
 use thiserror::Error;
 
 use crate::assemble::Pattern;
@@ -173,6 +174,31 @@ impl Factor {
             }
         }
         Ok(())
+    }
+
+    /// The last `size` rows and columns of the factor L, its upper triangle zero.
+    pub(super) fn tail(&self, symbolic: &SymbolicFactor, size: usize) -> Mat<f64> {
+        let mut tail = Mat::zeros(size, size);
+        let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.symbolic.raw() else { return tail };
+        let first = raw.nrows() - size;
+        let factor = SupernodalLltRef::new(raw, &self.values);
+        for index in (0..raw.n_supernodes()).rev() {
+            let supernode = factor.supernode(index);
+            let (start, values) = (supernode.start(), supernode.val());
+            if start + values.ncols() <= first {
+                break;
+            }
+            for column in first.saturating_sub(start)..values.ncols() {
+                let to = start + column - first;
+                for row in column..values.ncols() {
+                    tail[(start + row - first, to)] = values[(row, column)];
+                }
+                for (row, &at) in supernode.pattern().iter().enumerate() {
+                    tail[(at as usize - first, to)] = values[(values.ncols() + row, column)];
+                }
+            }
+        }
+        tail
     }
 
     fn back_substitute(&mut self, symbolic: &SymbolicFactor, rhs: &mut [f64], n: usize, columns: usize) {

@@ -1,0 +1,265 @@
+//! Newton steps that meet the contact as it is: the tissue condensed to the surface that is touched, the contact solved for on it.
+//!
+//! Most of what is not linear in an iteration is the contact: which points touch, and how hard. It acts on few unknowns, the tail of the numbering
+//! ([`Dofs::condensed_to`]). Eliminating all others from the Newton system A Δ = −r leaves, for the tail u and the driven vertex t, the tissue's condensed
+//! stiffness K = S − C (S the Schur complement of A, which its factor's last rows hold: S = L Lᵀ; C the tail's own Hessian in A) and its condensed
+//! force f. On this small dense system
+//!
+//!   f + K u + ∇e(x + u, t) = 0,
+//!
+//! with e the energy of the effects on the tail, is solved by Newton's method as it stands, not linearised at x; the unknowns that were eliminated follow
+//! linearly. An outer iteration then converges as the tissue does, which is smooth. The equilibrium is the same: where Δ vanishes, so does r.
+//!
+//! Nested iteration on condensed unknowns: the "nonlinear elimination" of Lanzkron, Rose & Wilkes, *SIAM J. Sci. Comput.* 17 (1996) 538–559.
+//! Not here: which unknowns are the tail (`mesh::wall`), what becomes of the step (`globalization`).
+
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::prelude::Solve;
+use faer::{Accum, Mat, MatRef, Par, Side};
+use nalgebra::Vector3;
+
+use super::border::{Drive, Reduced};
+use super::newton::{NewtonError, System, Workspace};
+use super::sparse::norm;
+use crate::assemble::{Predicted, Tail};
+
+/// Iterations on the condensed system at most: each costs a small part of one on the whole.
+const MAX_ITERATIONS: usize = 12;
+/// Halvings of one of its steps.
+const MAX_HALVINGS: usize = 6;
+/// Residual over the first one at which it is solved: the tissue's own change is more than what is left.
+const REDUCTION: f64 = 1e-3;
+/// Relative difference below which the force on the driven vertex is that of the tail alone.
+const SAME: f64 = 1e-9;
+
+/// The tissue condensed to the tail, as of the last factorisation.
+pub(super) struct Condensed {
+    /// Schur complement S of the whole, row by row (mN/mm); empty: none is at hand.
+    whole: Mat<f64>,
+    /// Stiffness K of what is not in the tail.
+    tissue: Mat<f64>,
+    /// Memory for Hessians.
+    hessian: Vec<f64>,
+}
+
+impl Default for Condensed {
+    fn default() -> Self {
+        Condensed { whole: Mat::new(), tissue: Mat::new(), hessian: Vec::new() }
+    }
+}
+
+impl System<'_> {
+    fn tail(&self) -> Tail<'_> {
+        Tail { terms: self.terms, dofs: self.dofs, pattern: self.pattern }
+    }
+
+    /// Condenses the system that was just factorised at `positions` with the stresses `predicted`.
+    pub(super) fn condense(&self, positions: &[f64], predicted: &Predicted, workspace: &mut Workspace) {
+        let size = self.dofs.tail;
+        let Workspace { factor, scratch, condensed, .. } = workspace;
+        if size == 0 {
+            return;
+        }
+        let lower = factor.tail(self.symbolic, size);
+        let mut whole = Mat::<f64>::zeros(size, size);
+        matmul(
+            whole.as_mut(),
+            BlockStructure::TriangularLower,
+            Accum::Replace,
+            lower.as_ref(),
+            BlockStructure::TriangularLower,
+            lower.as_ref().transpose(),
+            BlockStructure::TriangularUpper,
+            1.0,
+            Par::Seq,
+        );
+        self.tail().hessian(positions, predicted, scratch, &mut condensed.hessian);
+        let stride = size + 3;
+        condensed.tissue =
+            Mat::from_fn(size, size, |i, j| whole[(i.max(j), i.min(j))] - condensed.hessian[i.max(j) * stride + i.min(j)]);
+        condensed.whole = Mat::from_fn(size, size, |i, j| whole[(i.max(j), i.min(j))]);
+    }
+
+    /// Goes on from the Newton step `step` (free unknowns, then the border) at `positions` to one that meets the effects on the tail as they are at its end;
+    /// whether it did. The driven vertex moves by no more than `max_travel_mm`.
+    ///
+    /// # Errors
+    /// [`NewtonError::Linear`].
+    pub(super) fn refine(
+        &self,
+        positions: &[f64],
+        step: &mut [f64],
+        drive: Drive,
+        max_travel_mm: f64,
+        workspace: &mut Workspace,
+    ) -> Result<bool, NewtonError> {
+        let size = self.dofs.tail;
+        let (free, tail) = (self.dofs.free, self.tail());
+        let first = free - size;
+        if size == 0 || workspace.condensed.whole.nrows() != size {
+            return Ok(false);
+        }
+        let gradient = tail.gradient(positions, &mut workspace.scratch);
+        let held = &workspace.residual[free..];
+        let apart = (0..3).any(|k| (held[k] - gradient[size + k]).abs() > SAME * norm(held));
+        let coupling = |k: usize| &workspace.values[self.pattern.stored() + k * free..][..first];
+        if apart || (0..3).any(|k| coupling(k).iter().any(|c| *c != 0.0)) {
+            return Ok(false);
+        }
+        let newton = &step[first..];
+        let mut condensed = std::mem::take(&mut workspace.condensed);
+        // The condensed residual, from the step that answers it: f + ∇e = −(S u + C t).
+        let border = &workspace.values[self.pattern.stored()..];
+        let mut force = times(&condensed.whole, &newton[..size]);
+        for (i, force) in force.iter_mut().enumerate() {
+            let coupled: f64 = (0..3).map(|k| border[k * free + first + i] * newton[size + k]).sum();
+            *force = -(*force + coupled);
+        }
+        force.iter_mut().zip(&gradient).for_each(|(f, g)| *f -= g);
+        let model = Model { system: self, tail, force: &force, tissue: &condensed.tissue, drive, origin: positions };
+        let best = model.solve(newton, max_travel_mm, &mut condensed.hessian, workspace);
+        if let Some(best) = &best {
+            let change: Vec<f64> = best[..size].iter().zip(&step[first..]).map(|(new, old)| new - old).collect();
+            let mut correction = vec![0.0; free];
+            correction[first..].copy_from_slice(&times(&condensed.whole, &change));
+            workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut correction)?;
+            step.iter_mut().zip(&correction).for_each(|(s, c)| *s += c);
+            step[free..].copy_from_slice(&best[size..]);
+        }
+        workspace.condensed = condensed;
+        Ok(best.is_some())
+    }
+
+    /// Replaces predicted stresses of the effects on the tail by those at `positions`.
+    pub(super) fn keep_tail_stresses(&self, positions: &[f64], predicted: &mut Predicted, workspace: &mut Workspace) {
+        self.tail().keep_stresses(positions, &mut workspace.scratch, predicted);
+    }
+}
+
+/// The condensed problem at one state of the whole.
+struct Model<'a> {
+    system: &'a System<'a>,
+    tail: Tail<'a>,
+    force: &'a [f64],
+    tissue: &'a Mat<f64>,
+    drive: Drive,
+    origin: &'a [f64],
+}
+
+impl Model<'_> {
+    /// The unknowns (tail, then border) at which the model is in balance, from `start`; `None` if nothing better than the start was found.
+    fn solve(
+        &self,
+        start: &[f64],
+        max_travel_mm: f64,
+        hessian: &mut Vec<f64>,
+        workspace: &mut Workspace,
+    ) -> Option<Vec<f64>> {
+        let size = self.force.len();
+        let mut at = start.to_vec();
+        let (mut residual, mut out_of_balance, mut left) = self.residual(&at, workspace);
+        let first = left;
+        let mut potential = self.potential(&at, workspace);
+        let directions: Vec<Vector3<f64>> = self.drive.directions().into_iter().map(|(direction, _)| direction).collect();
+        for _ in 0..MAX_ITERATIONS {
+            if left <= REDUCTION * first {
+                break;
+            }
+            let positions = self.positions(&at);
+            self.tail.hessian(&positions, &Predicted::default(), &mut workspace.scratch, hessian);
+            let stride = size + 3;
+            let matrix = Mat::from_fn(size, size, |i, j| {
+                if i >= j { self.tissue[(i, j)] + hessian[i * stride + j] } else { 0.0 }
+            });
+            let Ok(factor) = matrix.llt(Side::Lower) else { break };
+            let mut columns = Mat::<f64>::zeros(size, 1 + directions.len());
+            for i in 0..size {
+                columns[(i, 0)] = -residual[i];
+                for (d, direction) in directions.iter().enumerate() {
+                    columns[(i, 1 + d)] = (0..3).map(|k| hessian[(size + k) * stride + i] * direction[k]).sum();
+                }
+            }
+            let couplings = columns.clone();
+            factor.solve_in_place(&mut columns);
+            let dot = |a: usize, b: usize| (0..size).map(|i| couplings[(i, a)] * columns[(i, b)]).sum::<f64>();
+            let mut reduced = Reduced { directions: &directions, stiffness: Vec::new(), drive: Vec::new() };
+            for (row, along) in directions.iter().enumerate() {
+                for (column, other) in directions.iter().enumerate() {
+                    let own: f64 = (0..3)
+                        .flat_map(|i| (0..3).map(move |j| (i, j)))
+                        .map(|(i, j)| along[i] * other[j] * hessian[(size + i.max(j)) * stride + size + i.min(j)])
+                        .sum();
+                    reduced.stiffness.push(own - dot(1 + row, 1 + column));
+                }
+                reduced.drive.push(-out_of_balance[row] - dot(1 + row, 0));
+            }
+            let travels = reduced.solve(max_travel_mm);
+            let mut step: Vec<f64> = (0..size).map(|i| columns[(i, 0)]).collect();
+            for (d, travel) in travels.iter().enumerate() {
+                step.iter_mut().enumerate().for_each(|(i, s)| *s -= travel * columns[(i, 1 + d)]);
+            }
+            let moved: Vector3<f64> = directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
+            step.extend(moved.iter());
+            let Some(next) = self.descend(&at, &step, potential, max_travel_mm, workspace) else { break };
+            (at, potential) = next;
+            (residual, out_of_balance, left) = self.residual(&at, workspace);
+        }
+        (left < first).then_some(at)
+    }
+
+    /// The first of the halves of `step` that does not raise the potential.
+    fn descend(
+        &self,
+        at: &[f64],
+        step: &[f64],
+        potential: f64,
+        max_travel_mm: f64,
+        workspace: &mut Workspace,
+    ) -> Option<(Vec<f64>, f64)> {
+        let size = self.force.len();
+        for halvings in 0..=MAX_HALVINGS {
+            let scale = 0.5_f64.powi(halvings as i32);
+            let next: Vec<f64> = at.iter().zip(step).map(|(a, s)| a + scale * s).collect();
+            if norm(&next[size..]) > max_travel_mm {
+                continue;
+            }
+            let reached = self.potential(&next, workspace);
+            if reached <= potential {
+                return Some((next, reached));
+            }
+        }
+        None
+    }
+
+    fn positions(&self, at: &[f64]) -> Vec<f64> {
+        let mut positions = self.origin.to_vec();
+        self.system.dofs.advance_tail(&mut positions, at);
+        positions
+    }
+
+    /// Residual on the tail, out-of-balance force along each direction of the drive, and the norm of both (mN).
+    fn residual(&self, at: &[f64], workspace: &mut Workspace) -> (Vec<f64>, Vec<f64>, f64) {
+        let size = self.force.len();
+        let gradient = self.tail.gradient(&self.positions(at), &mut workspace.scratch);
+        let mut residual = times(self.tissue, &at[..size]);
+        for (i, r) in residual.iter_mut().enumerate() {
+            *r += self.force[i] + gradient[i];
+        }
+        let along = self.drive.out_of_balance(&Vector3::from_row_slice(&gradient[size..]));
+        let left = along.iter().fold(norm(&residual), |sum, a| sum.hypot(*a));
+        (residual, along, left)
+    }
+
+    fn potential(&self, at: &[f64], workspace: &mut Workspace) -> f64 {
+        let size = self.force.len();
+        let own = self.tail.energy(&self.positions(at), &mut workspace.scratch);
+        let stretched = times(self.tissue, &at[..size]);
+        let tissue: f64 = (0..size).map(|i| at[i] * (self.force[i] + 0.5 * stretched[i])).sum();
+        own + tissue - self.drive.work(&Vector3::from_row_slice(&at[size..]))
+    }
+}
+
+fn times(matrix: &Mat<f64>, vector: &[f64]) -> Vec<f64> {
+    let product = matrix * MatRef::from_column_major_slice(vector, vector.len(), 1);
+    (0..vector.len()).map(|i| product[(i, 0)]).collect()
+}
