@@ -251,31 +251,28 @@ fn for_each_active(
     scratch: &mut Scratch,
     mut visit: impl FnMut(usize, &Term, &Local, &mut Vec<f64>, &mut Vec<f64>),
 ) {
+    let Scratch { positions: current, other, hessian } = scratch;
     for (index, term) in terms.iter().enumerate() {
-        let groups = 0..term.stencils.len();
-        visit_active(index, term, groups, positions, predicted, scratch, &mut visit);
+        current.resize(3 * term.stencils.group_size, 0.0);
+        for group in 0..term.stencils.len() {
+            term.stencils.gather(group, positions, current);
+            let local = Local { current, group, predicted: predicted.of(index, group, term.effect.predicted_len()) };
+            if term.effect.is_active(&local) {
+                visit(index, term, &local, other, hessian);
+            }
+        }
     }
 }
 
-/// The same for the groups of `term` that are given.
-fn visit_active(
-    index: usize,
-    term: &Term,
-    groups: impl Iterator<Item = usize>,
-    positions: &[f64],
-    predicted: &Predicted,
-    scratch: &mut Scratch,
-    visit: &mut impl FnMut(usize, &Term, &Local, &mut Vec<f64>, &mut Vec<f64>),
-) {
-    let Scratch { positions: current, other, hessian } = scratch;
-    current.resize(3 * term.stencils.group_size, 0.0);
-    for group in groups {
-        term.stencils.gather(group, positions, current);
-        let local = Local { current, group, predicted: predicted.of(index, group, term.effect.predicted_len()) };
-        if term.effect.is_active(&local) {
-            visit(index, term, &local, other, hessian);
-        }
-    }
+/// Which stresses the Hessian of the tail is made with.
+#[derive(Clone, Copy)]
+pub(crate) enum Stresses<'a> {
+    /// None: what is left is not negative in any direction.
+    None,
+    /// Those of the positions.
+    Current,
+    /// Those predicted.
+    Predicted(&'a Predicted),
 }
 
 /// The effects on the tail alone: those groups whose unknowns are all in the tail of `dofs` or in the border. Vectors and matrices count the tail's unknowns, then
@@ -291,20 +288,35 @@ impl Tail<'_> {
     fn for_each_active(
         &self,
         positions: &[f64],
-        predicted: &Predicted,
+        stresses: Stresses,
         scratch: &mut Scratch,
         mut visit: impl FnMut(usize, &Term, &Local, &mut Vec<f64>, &mut Vec<f64>),
     ) {
+        let longest = self.terms.iter().map(|term| term.effect.predicted_len()).max().unwrap_or(0);
+        let none = vec![0.0; longest];
+        let Scratch { positions: current, other, hessian } = scratch;
         for (index, term) in self.terms.iter().enumerate() {
-            let groups = self.pattern.tail_groups[term.set].iter().copied();
-            visit_active(index, term, groups, positions, predicted, scratch, &mut visit);
+            current.resize(3 * term.stencils.group_size, 0.0);
+            let len = term.effect.predicted_len();
+            for &group in &self.pattern.tail_groups[term.set] {
+                term.stencils.gather(group, positions, current);
+                let predicted = match stresses {
+                    Stresses::None => &none[..len],
+                    Stresses::Current => &[],
+                    Stresses::Predicted(predicted) => predicted.of(index, group, len),
+                };
+                let local = Local { current, group, predicted };
+                if term.effect.is_active(&local) {
+                    visit(index, term, &local, other, hessian);
+                }
+            }
         }
     }
 
     /// Their energy (µJ).
     pub fn energy(&self, positions: &[f64], scratch: &mut Scratch) -> f64 {
         let mut total = 0.0;
-        self.for_each_active(positions, &Predicted::default(), scratch, |_, term, local, _, _| {
+        self.for_each_active(positions, Stresses::Current, scratch, |_, term, local, _, _| {
             total += term.effect.energy(local);
         });
         total
@@ -313,7 +325,7 @@ impl Tail<'_> {
     /// Their gradient (mN).
     pub fn gradient(&self, positions: &[f64], scratch: &mut Scratch) -> Vec<f64> {
         let mut out = vec![0.0; self.dofs.tail + 3];
-        self.for_each_active(positions, &Predicted::default(), scratch, |_, term, local, forces, _| {
+        self.for_each_active(positions, Stresses::Current, scratch, |_, term, local, forces, _| {
             let n = term.stencils.group_size;
             forces.clear();
             forces.resize(3 * n, 0.0);
@@ -328,11 +340,11 @@ impl Tail<'_> {
     }
 
     /// Their Hessian (mN/mm), row by row, the lower triangle.
-    pub fn hessian(&self, positions: &[f64], predicted: &Predicted, scratch: &mut Scratch, out: &mut Vec<f64>) {
+    pub fn hessian(&self, positions: &[f64], stresses: Stresses, scratch: &mut Scratch, out: &mut Vec<f64>) {
         let size = self.dofs.tail + 3;
         out.clear();
         out.resize(size * size, 0.0);
-        self.for_each_active(positions, predicted, scratch, |_, term, local, _, matrix| {
+        self.for_each_active(positions, stresses, scratch, |_, term, local, _, matrix| {
             let n = 3 * term.stencils.group_size;
             matrix.clear();
             matrix.resize(n * n, 0.0);
@@ -350,7 +362,7 @@ impl Tail<'_> {
 
     /// Replaces the stresses of these effects in `predicted` by those at `positions`.
     pub fn keep_stresses(&self, positions: &[f64], scratch: &mut Scratch, predicted: &mut Predicted) {
-        self.for_each_active(positions, &Predicted::default(), scratch, |index, term, local, moved, _| {
+        self.for_each_active(positions, Stresses::Current, scratch, |index, term, local, moved, _| {
             let len = term.effect.predicted_len();
             moved.clear();
             moved.resize(3 * term.stencils.group_size, 0.0);

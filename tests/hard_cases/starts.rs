@@ -159,7 +159,6 @@ fn a_single_solve_names_the_effect_that_cannot_start_there() {
             tolerance_mn: 1e-9,
             max_iterations: 40,
             max_travel_mm: 0.1,
-            held_iterations: 0,
         };
         for (name, mut positions) in bad_starts(&wall) {
             let mut workspace = Workspace::new(&bench.topology.pattern, &bench.topology.symbolic);

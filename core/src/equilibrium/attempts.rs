@@ -17,7 +17,7 @@ pub(super) struct Attempt {
     globalization: Globalization,
     /// Newton iterations for each load step.
     max_iterations: usize,
-    /// Whether it goes on from the equilibrium of a load that is nearly this one, the factor at hand; the needle then need not wait for the tissue.
+    /// Whether it goes on from the equilibrium of a load that is nearly this one, the factor at hand.
     resumes: bool,
 }
 
@@ -44,8 +44,6 @@ pub(super) const REPETITIONS: [Attempt; 2] = [
 ];
 /// Iterations of all attempts together: what takes more is a sharp edge that cuts its way in, where no load path of this model ends.
 const MOST_ITERATIONS: usize = 120;
-/// Iterations in which the needle waits for the tissue.
-const HELD_ITERATIONS: usize = 1;
 /// Share of the remaining way by which the needle overlaps the tissue at the start of load steps.
 const FIRST_OVERLAP: f64 = 0.05;
 /// Largest travel in one Newton iteration, in needle radii.
@@ -164,7 +162,6 @@ impl Wall<'_> {
             force_scale_mn: scale,
             tolerance_mn: (tolerance * scale).max(light_mn),
             max_iterations: attempt.max_iterations.min(MOST_ITERATIONS.saturating_sub(*spent)),
-            held_iterations: if attempt.resumes { 0 } else { HELD_ITERATIONS },
             max_travel_mm: MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
         };
         let solved = match attempt.resumes {

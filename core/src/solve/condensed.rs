@@ -21,14 +21,14 @@ use nalgebra::Vector3;
 use super::border::{Drive, Reduced};
 use super::newton::{NewtonError, System, Workspace};
 use super::sparse::norm;
-use crate::assemble::{Predicted, Tail};
+use crate::assemble::{Predicted, Stresses, Tail};
 
 /// Iterations on the condensed system at most: each costs a small part of one on the whole.
 const MAX_ITERATIONS: usize = 12;
 /// Halvings of one of its steps.
 const MAX_HALVINGS: usize = 6;
 /// Residual over the first one at which it is solved: the tissue's own change is more than what is left.
-const REDUCTION: f64 = 1e-3;
+const REDUCTION: f64 = 0.05;
 /// Relative difference below which the force on the driven vertex is that of the tail alone.
 const SAME: f64 = 1e-9;
 
@@ -73,10 +73,11 @@ impl System<'_> {
             1.0,
             Par::Seq,
         );
-        self.tail().hessian(positions, predicted, scratch, &mut condensed.hessian);
+        self.tail().hessian(positions, Stresses::Predicted(predicted), scratch, &mut condensed.hessian);
         let stride = size + 3;
-        condensed.tissue =
-            Mat::from_fn(size, size, |i, j| whole[(i.max(j), i.min(j))] - condensed.hessian[i.max(j) * stride + i.min(j)]);
+        condensed.tissue = Mat::from_fn(size, size, |i, j| {
+            whole[(i.max(j), i.min(j))] - condensed.hessian[i.max(j) * stride + i.min(j)]
+        });
         condensed.whole = Mat::from_fn(size, size, |i, j| whole[(i.max(j), i.min(j))]);
     }
 
@@ -146,6 +147,18 @@ struct Model<'a> {
     origin: &'a [f64],
 }
 
+/// Unknowns of the condensed problem and what is out of balance there.
+struct State {
+    /// Tail, then border (mm).
+    unknowns: Vec<f64>,
+    /// Residual on the tail (mN).
+    residual: Vec<f64>,
+    /// Along each direction of the drive (mN).
+    out_of_balance: Vec<f64>,
+    /// Norm of both.
+    left: f64,
+}
+
 impl Model<'_> {
     /// The unknowns (tail, then border) at which the model is in balance, from `start`; `None` if nothing better than the start was found.
     fn solve(
@@ -155,77 +168,83 @@ impl Model<'_> {
         hessian: &mut Vec<f64>,
         workspace: &mut Workspace,
     ) -> Option<Vec<f64>> {
-        let size = self.force.len();
-        let mut at = start.to_vec();
-        let (mut residual, mut out_of_balance, mut left) = self.residual(&at, workspace);
-        let first = left;
-        let mut potential = self.potential(&at, workspace);
-        let directions: Vec<Vector3<f64>> = self.drive.directions().into_iter().map(|(direction, _)| direction).collect();
+        let mut at = self.state(start.to_vec(), workspace);
+        let first = at.left;
         for _ in 0..MAX_ITERATIONS {
-            if left <= REDUCTION * first {
+            if at.left <= REDUCTION * first {
                 break;
             }
-            let positions = self.positions(&at);
-            self.tail.hessian(&positions, &Predicted::default(), &mut workspace.scratch, hessian);
-            let stride = size + 3;
-            let matrix = Mat::from_fn(size, size, |i, j| {
-                if i >= j { self.tissue[(i, j)] + hessian[i * stride + j] } else { 0.0 }
-            });
-            let Ok(factor) = matrix.llt(Side::Lower) else { break };
-            let mut columns = Mat::<f64>::zeros(size, 1 + directions.len());
-            for i in 0..size {
-                columns[(i, 0)] = -residual[i];
-                for (d, direction) in directions.iter().enumerate() {
-                    columns[(i, 1 + d)] = (0..3).map(|k| hessian[(size + k) * stride + i] * direction[k]).sum();
-                }
-            }
-            let couplings = columns.clone();
-            factor.solve_in_place(&mut columns);
-            let dot = |a: usize, b: usize| (0..size).map(|i| couplings[(i, a)] * columns[(i, b)]).sum::<f64>();
-            let mut reduced = Reduced { directions: &directions, stiffness: Vec::new(), drive: Vec::new() };
-            for (row, along) in directions.iter().enumerate() {
-                for (column, other) in directions.iter().enumerate() {
-                    let own: f64 = (0..3)
-                        .flat_map(|i| (0..3).map(move |j| (i, j)))
-                        .map(|(i, j)| along[i] * other[j] * hessian[(size + i.max(j)) * stride + size + i.min(j)])
-                        .sum();
-                    reduced.stiffness.push(own - dot(1 + row, 1 + column));
-                }
-                reduced.drive.push(-out_of_balance[row] - dot(1 + row, 0));
-            }
-            let travels = reduced.solve(max_travel_mm);
-            let mut step: Vec<f64> = (0..size).map(|i| columns[(i, 0)]).collect();
-            for (d, travel) in travels.iter().enumerate() {
-                step.iter_mut().enumerate().for_each(|(i, s)| *s -= travel * columns[(i, 1 + d)]);
-            }
-            let moved: Vector3<f64> = directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
-            step.extend(moved.iter());
-            let Some(next) = self.descend(&at, &step, potential, max_travel_mm, workspace) else { break };
-            (at, potential) = next;
-            (residual, out_of_balance, left) = self.residual(&at, workspace);
+            let Some(step) = self.step(&at, max_travel_mm, hessian, workspace) else { break };
+            let Some(next) = self.descend(&at, &step, max_travel_mm, workspace) else { break };
+            at = next;
         }
-        (left < first).then_some(at)
+        (at.left < first).then_some(at.unknowns)
     }
 
-    /// The first of the halves of `step` that does not raise the potential.
-    fn descend(
+    /// Newton's step from `at`; `None` if there is none.
+    fn step(
         &self,
-        at: &[f64],
-        step: &[f64],
-        potential: f64,
+        at: &State,
         max_travel_mm: f64,
+        hessian: &mut Vec<f64>,
         workspace: &mut Workspace,
-    ) -> Option<(Vec<f64>, f64)> {
+    ) -> Option<Vec<f64>> {
         let size = self.force.len();
+        let stride = size + 3;
+        let positions = self.positions(&at.unknowns);
+        // Stresses far above those in balance turn the Hessian over; without them it is as definite as the tissue.
+        let factor = [Stresses::Current, Stresses::None].into_iter().find_map(|stresses| {
+            self.tail.hessian(&positions, stresses, &mut workspace.scratch, hessian);
+            let entry = |i: usize, j: usize| if i >= j { self.tissue[(i, j)] + hessian[i * stride + j] } else { 0.0 };
+            Mat::from_fn(size, size, entry).llt(Side::Lower).ok()
+        })?;
+        let directions: Vec<Vector3<f64>> =
+            self.drive.directions().into_iter().map(|(direction, _)| direction).collect();
+        let coupling =
+            |i: usize, direction: &Vector3<f64>| (0..3).map(|k| hessian[(size + k) * stride + i] * direction[k]).sum();
+        let couplings = Mat::from_fn(size, 1 + directions.len(), |i, d| {
+            if d == 0 { -at.residual[i] } else { coupling(i, &directions[d - 1]) }
+        });
+        let columns = factor.solve(&couplings);
+        let dot = |a: usize, b: usize| (0..size).map(|i| couplings[(i, a)] * columns[(i, b)]).sum::<f64>();
+        let mut reduced = Reduced { directions: &directions, stiffness: Vec::new(), drive: Vec::new() };
+        for (row, along) in directions.iter().enumerate() {
+            for (column, other) in directions.iter().enumerate() {
+                let own: f64 = (0..3)
+                    .flat_map(|i| (0..3).map(move |j| (i, j)))
+                    .map(|(i, j)| along[i] * other[j] * hessian[(size + i.max(j)) * stride + size + i.min(j)])
+                    .sum();
+                reduced.stiffness.push(own - dot(1 + row, 1 + column));
+            }
+            reduced.drive.push(-at.out_of_balance[row] - dot(1 + row, 0));
+        }
+        let travels = reduced.solve(max_travel_mm);
+        let mut step: Vec<f64> = (0..size).map(|i| columns[(i, 0)]).collect();
+        for (d, travel) in travels.iter().enumerate() {
+            step.iter_mut().enumerate().for_each(|(i, s)| *s -= travel * columns[(i, 1 + d)]);
+        }
+        let moved: Vector3<f64> = directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
+        step.extend(moved.iter());
+        Some(step)
+    }
+
+    /// The first of the halves of `step` that brings the residual down or does not raise the potential.
+    fn descend(&self, at: &State, step: &[f64], max_travel_mm: f64, workspace: &mut Workspace) -> Option<State> {
+        let size = self.force.len();
+        let mut bound = None;
         for halvings in 0..=MAX_HALVINGS {
             let scale = 0.5_f64.powi(halvings as i32);
-            let next: Vec<f64> = at.iter().zip(step).map(|(a, s)| a + scale * s).collect();
+            let next: Vec<f64> = at.unknowns.iter().zip(step).map(|(a, s)| a + scale * s).collect();
             if norm(&next[size..]) > max_travel_mm {
                 continue;
             }
-            let reached = self.potential(&next, workspace);
-            if reached <= potential {
-                return Some((next, reached));
+            let next = self.state(next, workspace);
+            if next.left < at.left {
+                return Some(next);
+            }
+            let bound = *bound.get_or_insert_with(|| self.potential(&at.unknowns, workspace));
+            if self.potential(&next.unknowns, workspace) < bound {
+                return Some(next);
             }
         }
         None
@@ -237,17 +256,16 @@ impl Model<'_> {
         positions
     }
 
-    /// Residual on the tail, out-of-balance force along each direction of the drive, and the norm of both (mN).
-    fn residual(&self, at: &[f64], workspace: &mut Workspace) -> (Vec<f64>, Vec<f64>, f64) {
+    fn state(&self, unknowns: Vec<f64>, workspace: &mut Workspace) -> State {
         let size = self.force.len();
-        let gradient = self.tail.gradient(&self.positions(at), &mut workspace.scratch);
-        let mut residual = times(self.tissue, &at[..size]);
+        let gradient = self.tail.gradient(&self.positions(&unknowns), &mut workspace.scratch);
+        let mut residual = times(self.tissue, &unknowns[..size]);
         for (i, r) in residual.iter_mut().enumerate() {
             *r += self.force[i] + gradient[i];
         }
-        let along = self.drive.out_of_balance(&Vector3::from_row_slice(&gradient[size..]));
-        let left = along.iter().fold(norm(&residual), |sum, a| sum.hypot(*a));
-        (residual, along, left)
+        let out_of_balance = self.drive.out_of_balance(&Vector3::from_row_slice(&gradient[size..]));
+        let left = out_of_balance.iter().fold(norm(&residual), |sum, a| sum.hypot(*a));
+        State { unknowns, residual, out_of_balance, left }
     }
 
     fn potential(&self, at: &[f64], workspace: &mut Workspace) -> f64 {

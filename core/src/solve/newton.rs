@@ -40,13 +40,10 @@ pub struct NewtonSettings {
     pub max_iterations: usize,
     /// Largest travel of the driven vertex in one iteration (mm).
     pub max_travel_mm: f64,
-    /// Iterations at the beginning in which the driven vertex stays where it is: the tissue first adapts to a good guess of its
-    /// travel, whose small misfits a stiff contact would answer with large forces.
-    pub held_iterations: usize,
 }
 
-/// Residual over force scale below which chord steps are tried: the contact has found its points.
-const CHORD_BELOW: f64 = 1e-3;
+/// Residual over force scale below which chord steps are tried: the tissue hardly bends any further.
+const CHORD_BELOW: f64 = 1e-2;
 /// A chord step must bring the residual down to this share: it costs a fifth to a quarter of an iteration, of which few are left here.
 const CHORD_REDUCTION: f64 = 0.2;
 
@@ -225,11 +222,10 @@ impl System<'_> {
             }
             let weakened = self.factorize_definite(positions, &mut trial, workspace)?;
             report.shifts += weakened;
-            let limit = if report.iterations < settings.held_iterations { 0.0 } else { settings.max_travel_mm };
-            let (mut step, mut slope) = self.step(drive, limit, workspace)?;
+            let (mut step, mut slope) = self.step(drive, settings.max_travel_mm, workspace)?;
             report.iterations += 1;
             self.condense(positions, trial.predicted(), workspace);
-            let refined = self.refine(positions, &mut step, drive, limit, workspace)?;
+            let refined = self.refine(positions, &mut step, drive, settings.max_travel_mm, workspace)?;
             if refined {
                 slope = self.slope(&step, drive, workspace);
             }
@@ -239,7 +235,6 @@ impl System<'_> {
             let (halvings, residual_mn) = taken.ok_or(stuck)?;
             report.halvings += halvings;
             report.residual_mn = residual_mn;
-            if std::env::var_os("TRACE").is_some() { eprintln!("  it {} rel {:.2e} halv {} weak {} ref {}", report.iterations, residual_mn / settings.force_scale_mn, halvings, weakened, refined); }
             while report.residual_mn > settings.tolerance_mn
                 && report.residual_mn < CHORD_BELOW * settings.force_scale_mn
                 && self.chord(positions, drive, settings, &mut report, workspace)?
@@ -284,7 +279,6 @@ impl System<'_> {
         self.dofs.advance(positions, &step, 1.0);
         let residual_mn = self.residual(positions, drive, workspace);
         report.chords += 1;
-        if std::env::var_os("TRACE").is_some() { eprintln!("    chord rel {:.2e}", residual_mn / settings.force_scale_mn); }
         // Not a number is not smaller either.
         let pays = residual_mn <= CHORD_REDUCTION * report.residual_mn;
         if pays {

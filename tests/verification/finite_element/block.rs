@@ -377,7 +377,6 @@ impl<'a> Body<'a> {
             tolerance_mn: tolerance * force_scale_mn,
             max_iterations: 50,
             max_travel_mm: 1.0,
-            held_iterations: 0,
         };
         self.with_terms(|terms| {
             let (dofs, pattern, symbolic) = (&self.dofs, &self.pattern, &self.symbolic);

@@ -97,7 +97,6 @@ fn lean(coefficient: f64, tangent: f64) -> Result<(Vector3<f64>, Vector3<f64>), 
             tolerance_mn: 1e-7 * NORMAL_MN,
             max_iterations: 60,
             max_travel_mm: 1.0,
-            held_iterations: 0,
         };
         let mut workspace = Workspace::new(pattern, symbolic);
         let report = system.solve(&mut positions, Drive::Held, &settings, &mut workspace, &mut Silent)?;

@@ -83,7 +83,6 @@ impl Sphere {
             tolerance_mn: 1e-7 * pressure_kpa.abs(),
             max_iterations: 40,
             max_travel_mm: 1.0,
-            held_iterations: 0,
         };
         let mut workspace = Workspace::new(pattern, symbolic);
         system.solve(positions, Drive::Held, &settings, &mut workspace, &mut Silent).map(|_| ())

@@ -84,7 +84,6 @@ fn peel_force(fracture_energy: f64) -> f64 {
             tolerance_mn: 1e-5 * fracture_energy * WIDTH_MM,
             max_iterations: 300,
             max_travel_mm: 1.0,
-            held_iterations: 0,
         };
         system.solve(&mut positions, Drive::Held, &settings, &mut workspace, &mut Silent).expect("an equilibrium");
         let mut current = vec![0.0; 3 * GROUP];

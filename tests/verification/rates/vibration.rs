@@ -86,7 +86,6 @@ impl Column {
             tolerance_mn: 1e-12,
             max_iterations: 50,
             max_travel_mm: 1.0,
-            held_iterations: 0,
         };
         let mut positions = momentum.positions().to_vec();
         let mut workspace = Workspace::new(pattern, symbolic);
