@@ -24,9 +24,9 @@ use super::sparse::norm;
 use crate::assemble::{Predicted, Stresses, Tail};
 
 /// Iterations on the condensed system at most: each costs a small part of one on the whole.
-const MAX_ITERATIONS: usize = 12;
-/// Halvings of one of its steps.
-const MAX_HALVINGS: usize = 6;
+const MAX_ITERATIONS: usize = 20;
+/// Halvings of one of its steps: a needle that has lost touch moves as far as it may, and a stiff contact answers within a micrometre.
+const MAX_HALVINGS: usize = 16;
 /// Residual over the first one at which it is solved: the tissue's own change is more than what is left.
 const REDUCTION: f64 = 0.05;
 /// Relative difference below which the force on the driven vertex is that of the tail alone.
@@ -40,6 +40,13 @@ pub(super) struct Condensed {
     tissue: Mat<f64>,
     /// Memory for Hessians.
     hessian: Vec<f64>,
+}
+
+impl Condensed {
+    /// Leaves none at hand.
+    pub fn forget(&mut self) {
+        self.whole = Mat::new();
+    }
 }
 
 impl Default for Condensed {
@@ -81,54 +88,54 @@ impl System<'_> {
         condensed.whole = Mat::from_fn(size, size, |i, j| whole[(i.max(j), i.min(j))]);
     }
 
-    /// Goes on from the Newton step `step` (free unknowns, then the border) at `positions` to one that meets the effects on the tail as they are at its end;
-    /// whether it did. The driven vertex moves by no more than `max_travel_mm`.
+    /// From the Newton step `newton` (free unknowns, then the border) at `positions` the one that meets the effects on the tail as they are at its end; `None`
+    /// where that is not to be had. The driven vertex moves by no more than `max_travel_mm`.
     ///
     /// # Errors
     /// [`NewtonError::Linear`].
     pub(super) fn refine(
         &self,
         positions: &[f64],
-        step: &mut [f64],
+        newton: &[f64],
         drive: Drive,
         max_travel_mm: f64,
         workspace: &mut Workspace,
-    ) -> Result<bool, NewtonError> {
+    ) -> Result<Option<Vec<f64>>, NewtonError> {
         let size = self.dofs.tail;
         let (free, tail) = (self.dofs.free, self.tail());
         let first = free - size;
         if size == 0 || workspace.condensed.whole.nrows() != size {
-            return Ok(false);
+            return Ok(None);
         }
         let gradient = tail.gradient(positions, &mut workspace.scratch);
         let held = &workspace.residual[free..];
         let apart = (0..3).any(|k| (held[k] - gradient[size + k]).abs() > SAME * norm(held));
         let coupling = |k: usize| &workspace.values[self.pattern.stored() + k * free..][..first];
         if apart || (0..3).any(|k| coupling(k).iter().any(|c| *c != 0.0)) {
-            return Ok(false);
+            return Ok(None);
         }
-        let newton = &step[first..];
+        let start = &newton[first..];
         let mut condensed = std::mem::take(&mut workspace.condensed);
         // The condensed residual, from the step that answers it: f + ∇e = −(S u + C t).
         let border = &workspace.values[self.pattern.stored()..];
-        let mut force = times(&condensed.whole, &newton[..size]);
+        let mut force = times(&condensed.whole, &start[..size]);
         for (i, force) in force.iter_mut().enumerate() {
-            let coupled: f64 = (0..3).map(|k| border[k * free + first + i] * newton[size + k]).sum();
-            *force = -(*force + coupled);
+            let coupled: f64 = (0..3).map(|k| border[k * free + first + i] * start[size + k]).sum();
+            *force = -(*force + coupled + gradient[i]);
         }
-        force.iter_mut().zip(&gradient).for_each(|(f, g)| *f -= g);
         let model = Model { system: self, tail, force: &force, tissue: &condensed.tissue, drive, origin: positions };
-        let best = model.solve(newton, max_travel_mm, &mut condensed.hessian, workspace);
-        if let Some(best) = &best {
-            let change: Vec<f64> = best[..size].iter().zip(&step[first..]).map(|(new, old)| new - old).collect();
-            let mut correction = vec![0.0; free];
-            correction[first..].copy_from_slice(&times(&condensed.whole, &change));
-            workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut correction)?;
-            step.iter_mut().zip(&correction).for_each(|(s, c)| *s += c);
-            step[free..].copy_from_slice(&best[size..]);
-        }
+        let found = model.solve(start, max_travel_mm, &mut condensed.hessian, workspace);
+        let refined = found.map(|found| {
+            let change: Vec<f64> = found[..size].iter().zip(start).map(|(new, old)| new - old).collect();
+            let mut rest = vec![0.0; free];
+            rest[first..].copy_from_slice(&times(&condensed.whole, &change));
+            workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut rest)?;
+            rest.iter_mut().zip(newton).for_each(|(r, n)| *r += n);
+            rest.extend_from_slice(&found[size..]);
+            Ok(rest)
+        });
         workspace.condensed = condensed;
-        Ok(best.is_some())
+        refined.transpose()
     }
 
     /// Replaces predicted stresses of the effects on the tail by those at `positions`.
@@ -168,10 +175,14 @@ impl Model<'_> {
         hessian: &mut Vec<f64>,
         workspace: &mut Workspace,
     ) -> Option<Vec<f64>> {
-        let mut at = self.state(start.to_vec(), workspace);
-        let first = at.left;
+        let newton = self.state(start.to_vec(), workspace);
+        let still = self.state(vec![0.0; start.len()], workspace);
+        let first = newton.left;
+        let solved = REDUCTION * first.min(still.left);
+        // A needle that has lost touch moves as far as it may in a Newton step.
+        let mut at = if still.left < first { still } else { newton };
         for _ in 0..MAX_ITERATIONS {
-            if at.left <= REDUCTION * first {
+            if at.left <= solved {
                 break;
             }
             let Some(step) = self.step(&at, max_travel_mm, hessian, workspace) else { break };

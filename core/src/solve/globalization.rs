@@ -23,6 +23,7 @@ pub enum Globalization {
 }
 
 /// What one solve carries from step to step.
+#[derive(Clone)]
 pub(super) struct Trial {
     /// Positions at the beginning of the solve.
     start: Vec<f64>,
@@ -74,6 +75,8 @@ const GUARD_HALVINGS: usize = 6;
 const MAX_DOUBLINGS: usize = 4;
 /// Halvings tried for a step that inverts an element, and in one line search.
 const MAX_HALVINGS: usize = 30;
+/// Share of the residual that a step may leave without another being tried.
+const CLEAR_PROGRESS: f64 = 0.5;
 /// Share of the predicted decrease that a step must achieve (Armijo).
 const SUFFICIENT_DECREASE: f64 = 1e-4;
 /// Relative rounding error of the total energy, below which a decrease cannot be seen: the total is a small difference of the elements'
@@ -178,6 +181,34 @@ impl System<'_> {
             Globalization::PredictedStress => self.full_step(positions, step, trial, workspace),
             Globalization::LineSearch => self.line_search(positions, step, trial, workspace),
         }
+    }
+
+    /// Takes the first of two steps, or the second where the first brings the residual `before_mn` hardly down and the second leaves less of it: tissue that turns
+    /// far from where it was does not do what its condensed stiffness said.
+    pub(super) fn advance_better(
+        &self,
+        positions: &mut [f64],
+        [first, second]: [&Step; 2],
+        before_mn: f64,
+        trial: &mut Trial,
+        workspace: &mut Workspace,
+    ) -> Option<(usize, f64)> {
+        let (before, untried) = (positions.to_vec(), trial.clone());
+        let taken = self.advance(positions, first, trial, workspace);
+        let reached_mn = taken.map_or(f64::INFINITY, |(_, residual_mn)| residual_mn);
+        if reached_mn <= CLEAR_PROGRESS * before_mn {
+            return taken;
+        }
+        let tried = (positions.to_vec(), std::mem::replace(trial, untried));
+        positions.copy_from_slice(&before);
+        let other = self.advance(positions, second, trial, workspace);
+        if other.is_some_and(|(_, residual_mn)| residual_mn < reached_mn) {
+            return other;
+        }
+        positions.copy_from_slice(&tried.0);
+        *trial = tried.1;
+        self.residual(positions, trial.drive, workspace);
+        taken
     }
 
     /// Takes the whole step, or the first of its halves that inverts nothing and does not raise Π where it is guarded.

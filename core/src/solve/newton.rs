@@ -222,16 +222,23 @@ impl System<'_> {
             }
             let weakened = self.factorize_definite(positions, &mut trial, workspace)?;
             report.shifts += weakened;
-            let (mut step, mut slope) = self.step(drive, settings.max_travel_mm, workspace)?;
+            let (plain, slope) = self.step(drive, settings.max_travel_mm, workspace)?;
             report.iterations += 1;
-            self.condense(positions, trial.predicted(), workspace);
-            let refined = self.refine(positions, &mut step, drive, settings.max_travel_mm, workspace)?;
-            if refined {
-                slope = self.slope(&step, drive, workspace);
+            let plain = Step { step: plain, slope, number: report.iterations, weakened: weakened > 0, refined: false };
+            // Tissue about to buckle is not what its changed Hessian says: there the contact is left to the iteration.
+            match weakened {
+                0 => self.condense(positions, trial.predicted(), workspace),
+                _ => workspace.condensed.forget(),
             }
-            let step = Step { step, slope, number: report.iterations, weakened: weakened > 0, refined };
-            let taken = self.advance(positions, &step, &mut trial, workspace);
             let stuck = NewtonError::NoStep { iterations: report.iterations, residual_mn: report.residual_mn };
+            let taken = match self.refine(positions, &plain.step, drive, settings.max_travel_mm, workspace)? {
+                Some(refined) => {
+                    let slope = self.slope(&refined, drive, workspace);
+                    let refined = Step { step: refined, slope, refined: true, ..plain };
+                    self.advance_better(positions, [&refined, &plain], report.residual_mn, &mut trial, workspace)
+                }
+                None => self.advance(positions, &plain, &mut trial, workspace),
+            };
             let (halvings, residual_mn) = taken.ok_or(stuck)?;
             report.halvings += halvings;
             report.residual_mn = residual_mn;
@@ -274,8 +281,9 @@ impl System<'_> {
         workspace: &mut Workspace,
     ) -> Result<bool, NewtonError> {
         let before = positions.to_vec();
-        let (mut step, _) = self.step(drive, settings.max_travel_mm, workspace)?;
-        self.refine(&before, &mut step, drive, settings.max_travel_mm, workspace)?;
+        let (plain, _) = self.step(drive, settings.max_travel_mm, workspace)?;
+        let refined = self.refine(&before, &plain, drive, settings.max_travel_mm, workspace)?;
+        let step = refined.unwrap_or(plain);
         self.dofs.advance(positions, &step, 1.0);
         let residual_mn = self.residual(positions, drive, workspace);
         report.chords += 1;
