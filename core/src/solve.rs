@@ -3,5 +3,6 @@
 
 mod border;
 pub mod globalization;
+mod held;
 pub mod newton;
 pub mod sparse;

@@ -5,6 +5,7 @@
 use nalgebra::Vector3;
 
 use super::{ContactSettings, Equilibrium, Load, Motion, Wall};
+use crate::effect::Multiplier;
 use crate::mesh::wall::Place;
 use crate::progress::Progress;
 use crate::solve::newton::{
@@ -107,6 +108,7 @@ impl Wall<'_> {
     ) -> Result<Equilibrium, NewtonError> {
         let Load { motion, touch_mm, .. } = *load;
         let softened = self.contact.softened();
+        load.multipliers().for_each(Multiplier::reset);
         let mut total = NewtonReport::default();
         for step in 1..=attempt.load_steps {
             let share = step as f64 / attempt.load_steps as f64;

@@ -105,6 +105,15 @@ impl Trial {
     }
 }
 
+impl Trial {
+    /// Takes the potential at `positions` anew: a multiplier has changed.
+    pub fn renew(&mut self, system: &System, positions: &[f64], workspace: &mut Workspace) {
+        if self.globalization == Globalization::LineSearch {
+            self.potential = system.potential(positions, &self.start, self.drive, &mut workspace.scratch);
+        }
+    }
+}
+
 impl System<'_> {
     /// Assembles and factorises a positive definite Hessian; returns how often it was changed until it was one.
     pub(super) fn factorize_definite(
