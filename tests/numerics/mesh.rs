@@ -83,11 +83,8 @@ fn division() -> WallDivision {
 }
 
 fn disc_geometry(rings: usize, center: [f64; 2]) -> DiscGeometry {
-    DiscGeometry {
-        center,
-        radii: (0..=rings).map(|ring| 0.15 * 1.7_f64.powi(ring as i32)).collect(),
-        offsets: Vec::new(),
-    }
+    let radii = (0..=rings).map(|ring| 0.15 * 1.7_f64.powi(ring as i32)).collect();
+    DiscGeometry { center, radii, offsets: Vec::new() }
 }
 
 fn wall(topology: &WallTopology, center: [f64; 2]) -> WallGeometry {
