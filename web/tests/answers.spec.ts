@@ -170,8 +170,8 @@ test("what a scene has calls for effects, and goes with the link", async ({ reti
   const scene = (): Promise<Record<string, unknown>> =>
     retina.evaluate(() => (window.retina.request?.scene ?? {}) as Record<string, unknown>);
   await expect(state("bleb")).toHaveText("not simulated");
-  await set("Fluid under the retina", "0.02");
-  await set("… detached within", "0.6");
+  await set("Fluid volume", "0.02");
+  await set("Fluid radius", "0.6");
   await expect(state("bleb")).toHaveText("simulated");
   expect((await scene())["bleb"]).toEqual({ volume_mm3: 0.02, radius_mm: 0.6 });
   const bleb = await retina.evaluate(() => window.retina.answer?.contact.bleb);
@@ -181,21 +181,21 @@ test("what a scene has calls for effects, and goes with the link", async ({ reti
   await panel.locator("#fluid").scrollIntoViewIfNeeded();
   await retina.screenshot({ path: "artefacts/conditions.png" });
   await expect.poll(() => retina.url()).toContain("scene.bleb.volume_mm3=0.02");
-  await set("Fluid under the retina", "0");
+  await set("Fluid volume", "0");
   await expect(state("bleb")).toHaveText("not simulated");
   expect((await retina.evaluate(() => window.retina.request?.scene)) ?? "").toBe("macula");
 
   await set("Eye pressure", "30");
   await expect(state("pressure")).toHaveText("simulated");
   expect((await scene())["pressure_kpa"]).toBeCloseTo(30 * 0.133322, 3);
-  await set("Friction coefficient", "0.5");
-  await set("Strength of the retina's bond", "1");
+  await set("Friction", "0.5");
+  await set("Bond strength", "1");
   const { tissue, friction_coefficient } = await scene();
   expect(friction_coefficient).toBe(0.5);
   expect(tissue).toMatchObject({ bond: { strength_kpa: 1 } });
   await expect(state("adhesion")).toHaveText("simulated");
   // Beyond a range the server says what is allowed, and the page says it beside the number.
-  await set("Friction coefficient", "7");
+  await set("Friction", "7");
   await expect(panel.locator(".number.wrong")).toContainText("allowed");
 });
 

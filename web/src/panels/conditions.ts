@@ -28,7 +28,7 @@ const RADIUS = "scene.bleb.radius_mm";
 const CONDITIONS: readonly Condition[] = [
   {
     field: "scene.friction_coefficient",
-    label: "Friction coefficient",
+    label: "Friction",
     unit: "",
     inWire: 1,
     step: 0.01,
@@ -42,27 +42,27 @@ const CONDITIONS: readonly Condition[] = [
   },
   {
     field: "scene.rest_pressure_kpa",
-    label: "… when the surface was measured",
+    label: "Rest pressure",
     unit: "mmHg",
     inWire: MMHG_KPA,
     step: 0.5,
   },
   {
     field: "scene.tissue.bond.strength_kpa",
-    label: "Strength of the retina's bond",
+    label: "Bond strength",
     unit: "kPa",
     inWire: 1,
     step: 0.5,
   },
   {
     field: VOLUME,
-    label: "Fluid under the retina",
+    label: "Fluid volume",
     unit: "µl",
     inWire: 1,
     step: 0.005,
     none: 0,
   },
-  { field: RADIUS, label: "… detached within", unit: "mm", inWire: 1, step: 0.05 },
+  { field: RADIUS, label: "Fluid radius", unit: "mm", inWire: 1, step: 0.05 },
 ];
 
 /** Whether a number of the scene has its control here. */
@@ -118,7 +118,7 @@ export function conditions({ settings, session, complaints }: Page): HTMLElement
     setText(
       fluid,
       bleb
-        ? `Its pressure: ${figures(bleb.pressure_mmhg)} mmHg (${figures(bleb.pressure_kpa)} kPa) above the eye's`
+        ? `Fluid of ${figures(bleb.volume_mm3)} µl, ${figures(bleb.pressure_mmhg)} mmHg (${figures(bleb.pressure_kpa)} kPa) above the eye`
         : "",
     );
   });

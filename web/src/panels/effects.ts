@@ -42,7 +42,7 @@ export function effectsPanel(page: Page): void {
   };
   complaints.register(complainer, "effects");
   const warnings = element("p", { class: "note" });
-  body.append(rule.root, list, complaint, warnings, conditions(page));
+  body.append(conditions(page), rule.root, list, complaint, warnings);
 
   const turn = (name: string, on: boolean): void => {
     const now = settings.get().effects;
