@@ -89,13 +89,14 @@ impl Wall<'_> {
     /// Which faces of the interface lie inside of the bleb.
     pub fn detached(&self, bleb: &Bleb) -> Vec<bool> {
         let stencils = &self.topology.interface;
+        let away_mm = |&vertex: &u32| {
+            let [x, y] = self.geometry.parameters[self.topology.vertices[vertex as usize].0];
+            (x - bleb.center[0]).hypot(y - bleb.center[1])
+        };
+        // The mean of distances, and not the distance of the mean, which lies inside of a long arc.
         let inside = |group: usize| {
             let nodes = stencils.group(group);
-            let middle = [0, 1].map(|k| {
-                let places = nodes.iter().map(|&v| self.geometry.parameters[self.topology.vertices[v as usize].0][k]);
-                places.sum::<f64>() / nodes.len() as f64
-            });
-            (middle[0] - bleb.center[0]).hypot(middle[1] - bleb.center[1]) < bleb.radius_mm
+            nodes.iter().map(away_mm).sum::<f64>() < bleb.radius_mm * nodes.len() as f64
         };
         (0..stencils.len()).map(inside).collect()
     }

@@ -87,9 +87,9 @@ pub const REFERENCE: Resolution = Resolution {
 };
 
 impl Resolution {
-    /// As fine as the edge of a detached disc needs at least: circles of two cells a quarter, three rings within it and three around it.
+    /// As fine as a detached disc needs at least: three rings within its edge and three around it.
     pub fn over_fluid(&self) -> Resolution {
-        Resolution { core_cells: self.core_cells.max(2), rings: self.rings.max(6), ..*self }
+        Resolution { rings: self.rings.max(6), ..*self }
     }
 
     /// The mesh division for `tissue`; with an interface under the retina if it is `parting`.

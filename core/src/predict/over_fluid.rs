@@ -66,9 +66,10 @@ impl Question<'_> {
         })
     }
 
-    /// Refuses a bleb whose centre is not under the patch.
+    /// Refuses a bleb that is called for and whose centre is not under the patch.
     pub(super) fn check_bleb(&self) -> Result<(), PredictError> {
-        let Some(Bleb { center: [x_mm, y_mm], .. }) = self.bleb() else { return Ok(()) };
+        let lifted = self.lifting(Level::Coarse).simulated;
+        let Some(Bleb { center: [x_mm, y_mm], .. }) = self.bleb().filter(|_| lifted) else { return Ok(()) };
         let limit_mm = self.patch().parameters.iter().flatten().fold(0.0_f64, |limit, c| limit.max(c.abs()));
         if x_mm.abs().max(y_mm.abs()) > limit_mm {
             return Err(PredictError::BlebOutsidePatch { x_mm, y_mm, limit_mm });
