@@ -103,9 +103,7 @@ impl Trial {
             force_scale_mn: settings.force_scale_mn,
         }
     }
-}
 
-impl Trial {
     /// Takes the potential at `positions` anew: a multiplier has changed.
     pub fn renew(&mut self, system: &System, positions: &[f64], workspace: &mut Workspace) {
         if self.globalization == Globalization::LineSearch {

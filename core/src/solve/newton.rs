@@ -8,6 +8,8 @@
 //! Near the end the Hessian hardly changes any more: there the last factor is used again for as long as it pays (chord steps), at a fraction of the cost
 //! of a new one.
 //!
+//! What an effect holds at a value (an enclosed volume) is one equation more, and its multiplier one unknown more (`held.rs`).
+//!
 //! How a step is used, and kept from going astray, is [`Globalization`]'s business (`globalization.rs`).
 //!
 //! An unconverged state is an error with its residual, never an answer.

@@ -6,13 +6,14 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use retina_core::effect::Multiplier;
 use retina_core::effects::adhesion::{Adhesion, Bond, Interface};
 use retina_core::effects::bleb::{Fluid, Holds};
+use retina_core::effects::finite_strain::{FiniteStrain, Lame, NeoHookean};
 use retina_core::equilibrium::bleb::{Bleb, VOLUME_TOLERANCE};
 use retina_core::equilibrium::{Addition, ContactSettings, Equilibrium, Load, MeshSize, Motion, Solid, Tool, Wall};
 use retina_core::mesh::disc::DiscGeometry;
 use retina_core::mesh::wall::{Place, WallDivision, WallTopology};
 use retina_core::needle::NeedleShape;
 use retina_core::progress::Silent;
-use retina_core::solve::newton::Workspace;
+use retina_core::solve::newton::{Drive, Globalization, NewtonSettings, System, Workspace};
 use retina_core::surface::Surface;
 use retina_core::tissue::{Layer, Tissue};
 
@@ -242,4 +243,53 @@ fn pressure_and_reaction_are_slopes_of_one_energy() {
     let other = (leaking(volume_mm3 + step_mm3) - leaking(volume_mm3 - step_mm3)) / (2.0 * step_mm3);
     println!("at constant pressure {other:.6} mN/mm³");
     assert!((other / force_slope - 1.0).abs() > 0.05, "{other} {force_slope}");
+}
+
+#[test]
+fn a_line_search_finds_the_pressure_that_full_steps_find() {
+    let plate = Plate::new(0.12, Solid::FiniteStrain);
+    let body = NeedleShape::hemispherical(0.2).body();
+    let pose = Isometry3::from_parts(Translation3::new(0.0, 0.0, 5.0), UnitQuaternion::identity());
+    let wall = plate.wall(Tool { body: &body, patch_from_needle: pose, stiffness_mn_per_mm: None });
+    let lame = |layer: &Layer| Lame { mu: layer.shear_modulus_kpa(), lambda: layer.first_lame_kpa() };
+    let layers = [lame(&plate.tissue.retina[0]), lame(&plate.tissue.choroid)];
+    let materials: Vec<Lame> = plate.topology.element_layer.iter().map(|&layer| layers[layer]).collect();
+    let solid = FiniteStrain { geometry: &wall.geometry.solid, materials: &materials, law: NeoHookean::Logarithmic };
+    let interface = Interface::new(&plate.topology.interface, &wall.geometry.rest);
+    let bond = Bond { strength_kpa: 1.0, fracture_energy_mn_per_mm: 0.1, stiffness_kpa_per_mm: 1e5 };
+    let apart = vec![2.0 * bond.parted_mm(); interface.points() * plate.topology.interface.len()];
+    let adhesion = Adhesion { interface: &interface, bond, largest_mm: &apart };
+    let volume_mm3 = 0.05;
+    let found = |globalization: Globalization, wanted_mm3: f64| {
+        let first_kpa = plate.pressure_kpa(wanted_mm3);
+        let holds = Holds::Volume(Multiplier::new(first_kpa, wanted_mm3, first_kpa * PI * RADIUS_MM * RADIUS_MM));
+        let fluid = Fluid { detached: &vec![true; plate.topology.interface.len()], holds };
+        let terms = [
+            plate.topology.term(Place::Elements, &solid),
+            plate.topology.term(Place::Interface, &adhesion),
+            plate.topology.term(Place::Interface, &fluid),
+        ];
+        let (dofs, pattern, symbolic) = (&plate.topology.dofs, &plate.topology.pattern, &plate.topology.symbolic);
+        let driven = Some(plate.topology.needle());
+        let system = System { terms: &terms, dofs, pattern, symbolic, driven, dead_load: &[] };
+        let settings = NewtonSettings {
+            globalization,
+            force_scale_mn: 0.01,
+            tolerance_mn: 1e-9,
+            max_iterations: 60,
+            max_travel_mm: 1.0,
+            held_iterations: 0,
+        };
+        let mut positions = wall.start();
+        let mut workspace = Workspace::new(pattern, symbolic);
+        let report = system.solve(&mut positions, Drive::Held, &settings, &mut workspace, &mut Silent).expect("a bleb");
+        println!("{globalization:?}: {:.8} kPa, {} iterations", fluid.pressure_kpa(), report.iterations);
+        assert!((wall.fluid_volume_mm3(&fluid, &positions) / wanted_mm3 - 1.0).abs() < VOLUME_TOLERANCE);
+        fluid.pressure_kpa()
+    };
+    let [full, searched] =
+        [Globalization::PredictedStress, Globalization::LineSearch].map(|way| found(way, volume_mm3));
+    assert!((searched / full - 1.0).abs() < 1e-6, "{searched} {full}");
+    let other = found(Globalization::LineSearch, 1.01 * volume_mm3);
+    assert!(other / full > 1.005, "{other} {full}");
 }
