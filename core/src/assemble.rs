@@ -200,6 +200,15 @@ pub struct Scratch {
     hessian: Vec<f64>,
 }
 
+impl Scratch {
+    /// Two vectors of this length.
+    pub(crate) fn pair(&mut self, len: usize) -> [&mut [f64]; 2] {
+        self.positions.resize(len, 0.0);
+        self.other.resize(len, 0.0);
+        [&mut self.positions, &mut self.other]
+    }
+}
+
 /// Predicted stresses of every group of every term; [`Predicted::default`] stands for those of the current positions.
 #[derive(Clone, Debug, Default)]
 pub struct Predicted {

@@ -2,11 +2,13 @@
 //!
 //! "Who interacts" is data ([`Stencils`]), "with what energy" is code ([`Effect`]); the sum over groups is written once, in
 //! [`crate::assemble`]. Energies are functions of the positions handed in and of nothing else that changes, so the solver may
-//! evaluate them wherever it likes. Units: mm, mN, µJ.
+//! evaluate them wherever it likes; but for a [`Multiplier`], which only the solver changes. Units: mm, mN, µJ.
 //!
 //! Local vectors are component-major: the x of every vertex of the group, then every y, then every z, so that inner loops run
 //! over contiguous numbers. A local Hessian is a dense row-major square in the same order, of which only the lower triangle
 //! (column ≤ row) is read.
+
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// One group of vertices, as an effect sees it. All slices have length 3 × vertices of the group, component-major.
 #[derive(Clone, Copy, Debug)]
@@ -18,6 +20,45 @@ pub struct Local<'a> {
     /// Stresses of this group as the last linear step predicted them ([`Effect::predict_stress`]), for the Hessian's
     /// stress-dependent part; empty: the stresses of `current`.
     pub predicted: &'a [f64],
+}
+
+/// The unknown of an effect beside the positions: Lagrange's multiplier of what it holds (the pressure of an enclosed volume).
+#[derive(Debug)]
+pub struct Multiplier {
+    first: f64,
+    /// Bits of the present value: effects are shared between threads.
+    now: AtomicU64,
+    /// What the effect holds its measure at.
+    pub wanted: f64,
+    /// Force that counts as its size (mN): that of a measure that is off by all of what is wanted.
+    pub force_mn: f64,
+}
+
+impl Multiplier {
+    /// A multiplier that begins at `first`.
+    pub fn new(first: f64, wanted: f64, force_mn: f64) -> Self {
+        Multiplier { first, now: AtomicU64::new(first.to_bits()), wanted, force_mn }
+    }
+
+    /// Its present value.
+    pub fn value(&self) -> f64 {
+        f64::from_bits(self.now.load(Ordering::Relaxed))
+    }
+
+    /// Gives it a value.
+    pub fn set(&self, value: f64) {
+        self.now.store(value.to_bits(), Ordering::Relaxed);
+    }
+
+    /// Back to where it began.
+    pub fn reset(&self) {
+        self.set(self.first);
+    }
+
+    /// What is missing of the measure, as a force (mN).
+    pub fn missing_mn(&self, held: f64) -> f64 {
+        (self.wanted - held) / self.wanted * self.force_mn
+    }
 }
 
 /// An energy on small groups of vertices.
@@ -55,6 +96,19 @@ pub trait Effect: Send + Sync {
     fn max_step(&self, _local: &Local, _step: &[f64]) -> f64 {
         1.0
     }
+
+    /// The unknown of an effect that holds something at a value: its energy is then −multiplier × what it holds ([`Effect::held`]). At most one effect of a system has one.
+    fn multiplier(&self) -> Option<&Multiplier> {
+        None
+    }
+
+    /// This group's part of what is held (mm³ for a volume).
+    fn held(&self, _local: &Local) -> f64 {
+        0.0
+    }
+
+    /// Adds ∂[`held`](Effect::held)/∂position to `out`.
+    fn add_held_slope(&self, _local: &Local, _out: &mut [f64]) {}
 }
 
 /// Groups of equally many vertices.

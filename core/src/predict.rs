@@ -2,7 +2,7 @@
 //!
 //! [`PreparedScene`] holds what depends on the scene alone; [`Workspace`] is a thread's memory. Read on in `types` (what goes in and comes
 //! out), `question` (a request in the patch's frame), `answer` (level by level), `linear` (the layered answer, start of all others),
-//! `finite_element` (the levels on meshes), `networks` and `learned` (the learned levels), `choice` (effects), `budget`, `expected_error` and `sampled` (levels),
+//! `finite_element` (the levels on meshes), `held` (the interface), `over_fluid` (a bleb), `networks` and `learned` (the learned levels), `choice` (effects), `budget`, `expected_error` and `sampled` (levels),
 //! `indentation` (many steps of one needle). Not here: HTTP, clocks, threads.
 
 mod answer;
@@ -13,10 +13,12 @@ pub mod calibration;
 pub mod choice;
 pub mod expected_error;
 pub mod finite_element;
+mod held;
 pub mod indentation;
 mod learned;
 pub mod linear;
 pub mod networks;
+mod over_fluid;
 mod question;
 pub mod sampled;
 pub(crate) mod topologies;
@@ -177,7 +179,10 @@ impl PreparedScene {
         let question = self.aimed(request, &body)?;
         let sink = question.sink();
         Ok(match question.begin(&question.raised(&sink))? {
-            Begun::Still(_) => question.situation(0.0, 0.0, None),
+            Begun::Still(_) => {
+                let lifted = question.lifting(Level::Coarse).simulated;
+                Situation { lifted, ..question.situation(0.0, 0.0, None) }
+            }
             Begun::Pressed(linear) => {
                 let expected = question.expected(&linear, &sink);
                 let error = |level| question.learned_error(level, &linear, expected, &sink);

@@ -4,8 +4,9 @@
 //! frame. Units: mm, kPa.
 //!
 //! Not here: the needle and its force (they come with each request), effects, the ranges of pressure and friction (`conditions`), where the tissue
-//! punctures (`puncture`).
+//! punctures (`puncture`), the numbers of the fluid (`bleb`).
 
+pub mod bleb;
 pub mod conditions;
 pub mod puncture;
 
@@ -18,6 +19,7 @@ use crate::patch::{Patch, PatchError};
 use crate::range::{OutOfRange, ParameterRange};
 use crate::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA, Surface, TriangleMesh};
 use crate::tissue::Tissue;
+use bleb::SubretinalFluid;
 use conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
 use puncture::Puncture;
 
@@ -71,6 +73,8 @@ pub struct Scene {
     pub rest_pressure_kpa: f64,
     /// Where the tissue punctures.
     pub puncture: Puncture,
+    /// Fluid under the retina.
+    pub bleb: Option<SubretinalFluid>,
 }
 
 impl Scene {
@@ -96,6 +100,7 @@ impl Scene {
             pressure_kpa: EYE_PRESSURE.default,
             rest_pressure_kpa: EYE_PRESSURE.default,
             puncture: Puncture::default(),
+            bleb: None,
         })
     }
 
@@ -111,6 +116,7 @@ impl Scene {
         EYE_PRESSURE.check("pressure_kpa", self.pressure_kpa)?;
         EYE_PRESSURE.check("rest_pressure_kpa", self.rest_pressure_kpa)?;
         self.puncture.validate()?;
+        self.bleb.iter().try_for_each(SubretinalFluid::validate)?;
         match self.surface {
             SceneSurface::Flat | SceneSurface::Mesh(_) => {}
             SceneSurface::Sphere { radius_mm } => EYE_RADIUS.check("surface.radius_mm", radius_mm)?,

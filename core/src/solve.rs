@@ -4,5 +4,6 @@
 mod border;
 mod condensed;
 pub mod globalization;
+mod held;
 pub mod newton;
 pub mod sparse;

@@ -11,6 +11,7 @@ use retina_core::predict::Level;
 use retina_core::predict::budget::DEFAULT_LEVEL;
 use retina_core::predict::networks::Networks;
 use retina_core::range::ParameterRange;
+use retina_core::scene::bleb;
 use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
 use retina_core::scene::puncture::{MAX_FORCE, MAX_STRAIN, PRESSURE_PER_MODULUS, Puncture, PunctureForce};
 use retina_core::scene::{Scene, SceneSurface};
@@ -31,9 +32,10 @@ use crate::wire::catalog::{
     SceneList, WeightsEntry,
 };
 use crate::wire::cost::CostTable;
+use crate::wire::fixed::Vector;
 use crate::wire::scene::{
-    BondSpec, LayerSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind, SurfaceSpec,
-    TissueSpec,
+    BlebSpec, BondSpec, LayerSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind,
+    SurfaceSpec, TissueSpec,
 };
 use crate::wire::stored::{StoreEntry, StoredScene};
 
@@ -157,6 +159,18 @@ pub fn spec(scene: &Scene) -> SceneSpec {
         pressure_kpa: Some(scene.pressure_kpa),
         rest_pressure_kpa: Some(scene.rest_pressure_kpa),
         puncture: Some(puncture(&scene.puncture)),
+        bleb: scene.bleb.as_ref().map(|fluid| BlebSpec {
+            volume_mm3: match fluid.filling {
+                bleb::Filling::Volume(volume_mm3) => Some(volume_mm3),
+                bleb::Filling::Pressure(_) => None,
+            },
+            pressure_kpa: match fluid.filling {
+                bleb::Filling::Volume(_) => None,
+                bleb::Filling::Pressure(pressure_kpa) => Some(pressure_kpa),
+            },
+            center_mm: Some(Vector(fluid.center_mm.coords.into())),
+            radius_mm: Some(fluid.radius_mm),
+        }),
     }
 }
 
@@ -228,6 +242,9 @@ fn parameters() -> Vec<ParameterEntry> {
         ("scene.puncture.pressure_per_modulus", &PRESSURE_PER_MODULUS),
         ("scene.puncture.max_force_mn", &MAX_FORCE),
         ("scene.puncture.max_strain", &MAX_STRAIN),
+        ("scene.bleb.volume_mm3", &bleb::VOLUME),
+        ("scene.bleb.pressure_kpa", &bleb::PRESSURE),
+        ("scene.bleb.radius_mm", &bleb::RADIUS),
     ];
     let layers = [
         ("inner_limiting_membrane", &INNER_LIMITING_MEMBRANE),

@@ -2,6 +2,7 @@
 //!
 //! `cargo test --release -p retina-tests --test hard_cases -- --nocapture --test-threads 1` prints what each case came to.
 
+mod blebs;
 mod conditions;
 mod materials;
 mod meshes;

@@ -30,7 +30,8 @@ fn pressed(topology: &WallTopology, s: f64, solid: Solid) -> ([f64; 3], usize) {
     let body = NeedleShape::hemispherical(0.257 * s).body();
     let tool = Tool { body: &body, patch_from_needle: Isometry3::identity(), stiffness_mn_per_mm: None };
     let radii = (0..=COARSE.rings).map(|ring| s * 0.15 * 10.0_f64.powf(ring as f64 / COARSE.rings as f64)).collect();
-    let mesh = MeshSize { disc: DiscGeometry { center: [0.0; 2], radii }, first_element_mm: 0.3 * s };
+    let mesh =
+        MeshSize { disc: DiscGeometry { center: [0.0; 2], radii, offsets: Vec::new() }, first_element_mm: 0.3 * s };
     let contact = ContactSettings {
         stiffness_kpa_per_mm: COARSE.contact.stiffness_kpa_per_mm / s,
         smoothing_mm: COARSE.contact.smoothing_mm * s,

@@ -35,7 +35,7 @@ impl Bench {
     /// The wall with the needle's tip at this height over it (mm).
     fn wall(&self, solid: Solid, height_mm: f64) -> Wall<'_> {
         let radii = (0..=COARSE.rings).map(|ring| 0.15 * 10.0_f64.powf(ring as f64 / COARSE.rings as f64)).collect();
-        let disc = DiscGeometry { center: [0.0; 2], radii };
+        let disc = DiscGeometry { center: [0.0; 2], radii, offsets: Vec::new() };
         let mesh = MeshSize { disc, first_element_mm: 0.3 };
         let patch_from_needle = Isometry3::from_parts(Translation3::new(0.0, 0.0, height_mm), nalgebra::one());
         let tool = Tool { body: &self.body, patch_from_needle, stiffness_mn_per_mm: None };

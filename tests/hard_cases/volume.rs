@@ -24,7 +24,7 @@ fn change(resolution: &Resolution, poisson_ratio: f64, force_mn: f64) -> (f64, f
     let tool = Tool { body: &body, patch_from_needle: Isometry3::identity(), stiffness_mn_per_mm: None };
     let rings = resolution.rings;
     let radii = (0..=rings).map(|ring| 0.15 * 12.0_f64.powf(ring as f64 / rings as f64)).collect();
-    let mesh = MeshSize { disc: DiscGeometry { center: [0.0; 2], radii }, first_element_mm: 0.3 };
+    let mesh = MeshSize { disc: DiscGeometry { center: [0.0; 2], radii, offsets: Vec::new() }, first_element_mm: 0.3 };
     let wall =
         Wall::new(&topology, &Surface::Flat, &tissue, &mesh, Solid::FiniteStrain, resolution.contact, tool).unwrap();
     let direction = -Vector3::z_axis();

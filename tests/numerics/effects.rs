@@ -4,6 +4,7 @@
 //! Lengths are scaled with their moduli, so that a row is the same problem in other units of length.
 
 mod adhesion;
+mod bleb;
 mod friction;
 mod pressure;
 mod tool_flex;
@@ -40,13 +41,14 @@ const SIZES: [f64; 3] = [1.0, 1e-3, 1e3];
 const REPEATS: usize = 4;
 
 /// The rows of the derivative check: each runs [`check_effect`] on its effect.
-const ROWS: [(&str, fn()); 9] = [
+const ROWS: [(&str, fn()); 10] = [
     ("elasticity", check_elasticity),
     ("finite_strain", check_finite_strain),
     ("contact", check_contact),
     ("friction", friction::check),
     ("pressure", pressure::check),
     ("adhesion", adhesion::check),
+    ("bleb", bleb::check),
     ("viscoelasticity", check_viscoelasticity),
     ("inertia", check_inertia),
     ("tool_flex", tool_flex::check),

@@ -12,6 +12,7 @@ mod mesh_file;
 mod meshes;
 mod needle;
 mod network;
+mod offset_disc;
 mod patch;
 mod scene;
 mod shaft;

@@ -83,7 +83,8 @@ fn division() -> WallDivision {
 }
 
 fn disc_geometry(rings: usize, center: [f64; 2]) -> DiscGeometry {
-    DiscGeometry { center, radii: (0..=rings).map(|ring| 0.15 * 1.7_f64.powi(ring as i32)).collect() }
+    let radii = (0..=rings).map(|ring| 0.15 * 1.7_f64.powi(ring as i32)).collect();
+    DiscGeometry { center, radii, offsets: Vec::new() }
 }
 
 fn wall(topology: &WallTopology, center: [f64; 2]) -> WallGeometry {
@@ -375,7 +376,7 @@ fn an_interface_doubles_its_vertices_and_changes_nothing_else() {
     let whole = WallTopology::new(division()).unwrap();
     let split = WallTopology::new(WallDivision { layers_above_interface: Some(1), ..division() }).unwrap();
     assert!(whole.interface.is_empty() && split.interface.len() == whole.faces.len());
-    let disc = DiscGeometry { center: [0.1, -0.2], radii: vec![0.2, 0.5, 0.9, 1.5] };
+    let disc = DiscGeometry { center: [0.1, -0.2], radii: vec![0.2, 0.5, 0.9, 1.5], offsets: Vec::new() };
     let layer = |thickness_mm, thins| LayerThickness { thickness_mm, thins, first_element_mm: f64::INFINITY };
     let layers = [layer(0.25, true), layer(0.3, false)];
     let column = |x: f64, y: f64| Surface::Sphere { radius_mm: 12.0 }.column(x, y);

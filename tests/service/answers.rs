@@ -121,6 +121,21 @@ fn a_leaning_needle_bends_by_its_stiffness() {
 }
 
 #[test]
+fn fluid_under_the_retina_is_told_with_its_pressure() {
+    let wet = json!({"bleb": {"volume_mm3": 0.02, "radius_mm": 0.6}});
+    let answer = answered(predict(&with(request("coarse"), "/scene", wet.clone())));
+    assert_matches("PredictResponse", &answer);
+    let bleb = |answer: &Value, field: &str| answer["contact"]["bleb"][field].as_f64().expect("number");
+    assert!((bleb(&answer, "volume_mm3") / 0.02 - 1.0).abs() < 1e-3);
+    let unpressed = answered(predict(&with(with(request("coarse"), "/scene", wet), "/force_mn/2", json!(0))));
+    assert!((bleb(&answer, "pressure_kpa") / bleb(&answer, "pressure_mmhg") - 0.133_322).abs() < 1e-6);
+    assert!(bleb(&answer, "pressure_kpa") > bleb(&unpressed, "pressure_kpa"));
+    assert_eq!((&unpressed["contact"]["state"], &answer["contact"]["state"]), (&json!("clear"), &json!("touching")));
+    assert!(numbers(&unpressed["surface"]["displacement_um"]).iter().any(|&um| um > 20.0));
+    assert_eq!(answered(predict(&request("coarse")))["contact"].get("bleb"), None);
+}
+
+#[test]
 fn puncture_is_always_told() {
     let row = |answer: &Value| {
         let effects = answer["effects"].as_array().expect("effects");

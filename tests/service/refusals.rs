@@ -221,6 +221,34 @@ fn a_needle_or_a_force_that_points_away() {
 }
 
 #[test]
+fn fluid_that_cannot_be() {
+    let wet = |bleb: Value| predict(&with(request("coarse"), "/scene", json!({"bleb": bleb})));
+    let cases = [
+        (json!({"volume_mm3": -0.01}), "scene.bleb.volume_mm3", "0 to 0.5 mm3"),
+        (json!({"volume_mm3": 0.6}), "scene.bleb.volume_mm3", "0 to 0.5 mm3"),
+        (json!({"pressure_kpa": 9}), "scene.bleb.pressure_kpa", "0 to 8 kPa"),
+        (json!({"volume_mm3": 0.01, "radius_mm": 3}), "scene.bleb.radius_mm", "0.2 to 1 mm"),
+    ];
+    for (bleb, field, allowed) in cases {
+        assert_eq!(assert_field(&wet(bleb), 422, "out-of-range", field)["allowed"], allowed);
+    }
+    let outside = wet(json!({"volume_mm3": 0.01, "center_mm": [1.2, 0, 0]}));
+    assert_field(&outside, 422, "outside-patch", "scene.bleb.center_mm");
+    let both = wet(json!({"volume_mm3": 0.01, "pressure_kpa": 1}));
+    assert_field(&both, 422, "invalid-request", "scene.bleb.pressure_kpa");
+    let neither = wet(json!({"radius_mm": 0.5}));
+    assert_field(&neither, 422, "invalid-request", "scene.bleb.volume_mm3");
+    let beside = wet(json!({"volume_mm3": 0.01, "center_mm": [0.9, 0.9, 0]}));
+    assert_field(&beside, 422, "not-possible", "needle.tip_mm");
+    let names = json!(["elasticity", "contact", "bleb"]);
+    let request = with(request("network"), "/scene", json!({"bleb": {"volume_mm3": 0.02}}));
+    assert_eq!(
+        assert_field(&predict(&with(request, "/effects", names)), 422, "unknown-name", "effects")["value"],
+        "finite_strain"
+    );
+}
+
+#[test]
 fn limits_of_puncture() {
     let limited = |puncture: Value| predict(&with(request("linear"), "/scene", json!({"puncture": puncture})));
     let cases = [

@@ -6,10 +6,12 @@
 //! Not here: whether an answer is accurate (the `accuracy` tier).
 
 use nalgebra::Point3;
+use retina_core::equilibrium::bleb::VOLUME_TOLERANCE;
 use retina_core::equilibrium::friction::FrictionError;
 use retina_core::needle::Needle;
 use retina_core::predict::{ContactState, Control, Level, PENETRATION_WARNING_MM, PredictError, Prediction, Request};
 use retina_core::scene::Scene;
+use retina_core::scene::bleb::Filling;
 use retina_core::solve::newton::NewtonError;
 use retina_core::tissue::Layer;
 
@@ -63,10 +65,20 @@ pub fn broken(scene: &Scene, request: &Request, answer: &Prediction) -> Vec<Stri
     let stiffness = |layer: &Layer| layer.first_lame_kpa() + 2.0 * layer.shear_modulus_kpa();
     let stiffest_kpa = scene.tissue.layers().iter().map(|named| stiffness(&named.layer)).fold(0.0, f64::max);
     let smallest = (SCALE_PER_STIFFNESS * stiffest_kpa).max(pressure_scale);
+    let lifted_alone = answer.contact.bleb.is_some() && answer.contact.state == ContactState::Clear;
     let scale_mn = match request.control {
-        Control::Force(force) => force.norm().max(smallest),
-        Control::Pose => POSE_SCALE_MN.max(smallest),
+        Control::Force(force) if !lifted_alone => force.norm().max(smallest),
+        _ => POSE_SCALE_MN.max(smallest),
     };
+    if let (Some(found), Some(fluid)) = (answer.contact.bleb, scene.bleb) {
+        let missing = match fluid.filling {
+            Filling::Volume(volume_mm3) => found.volume_mm3 / volume_mm3 - 1.0,
+            Filling::Pressure(pressure_kpa) => (found.pressure_kpa - pressure_kpa) / pressure_kpa,
+        };
+        if missing.is_nan() || missing.abs() > VOLUME_TOLERANCE {
+            broken.push(format!("fluid of {:?} came to {found:?}", fluid.filling));
+        }
+    }
     let light_mn = match request.control {
         Control::Force(force) if force.norm() < LIGHT_MN => LIGHT_SHARE * force.norm(),
         _ => 0.0,
@@ -155,7 +167,9 @@ pub fn cause(error: &PredictError) -> (Kind, &'static str) {
         PredictError::Linear(problem) if problem.contains("grows past") => (Refused, "contact too wide"),
         PredictError::Linear(problem) if problem.contains("shaft") => (Refused, "shaft first"),
         PredictError::Linear(_) => (Failed, "level linear"),
-        PredictError::Solver { cause, .. } => (Failed, newton(cause)),
+        PredictError::BlebOutsidePatch { .. } => (Refused, "bleb outside the patch"),
+        PredictError::BesideBleb { .. } => (Refused, "beside the bleb"),
+        PredictError::Solver { cause, .. } | PredictError::Bleb { cause, .. } => (Failed, newton(cause)),
         PredictError::Friction { cause: FrictionError::Newton(cause), .. } => (Failed, newton(cause)),
         PredictError::Friction { cause: FrictionError::NotSettled { .. }, .. } => (Failed, "friction does not settle"),
     }

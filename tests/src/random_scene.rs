@@ -207,6 +207,7 @@ impl SceneNumbers {
             pressure_kpa,
             rest_pressure_kpa,
             puncture: Puncture::default(),
+            bleb: None,
         }
     }
 }

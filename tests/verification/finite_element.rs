@@ -1,5 +1,6 @@
 //! The element, the solid energies, the assembly and the solver against closed forms and other people's tables.
 
+mod bleb;
 pub mod block;
 mod closed_forms;
 mod homogeneous;

@@ -115,6 +115,90 @@ test("effects are listed with their reason, and switched", async ({ retina, serv
   );
 });
 
+test("effects are left to the server, all asked for, or chosen one by one", async ({
+  retina,
+  server,
+}) => {
+  await open(retina, server, "#level=coarse");
+  await retina.getByText("Effects", { exact: true }).click();
+  const panel = retina.locator("[data-panel=effects]");
+  const asked = (): Promise<unknown> => retina.evaluate(() => window.retina.request?.effects);
+  const rule = (name: string): Promise<void> =>
+    panel.getByRole("radio", { name, exact: true }).check();
+  await expect(panel.getByRole("radio", { name: "automatic" })).toBeChecked();
+  await rule("all");
+  await expect.poll(asked).toBe("all");
+  await settled(retina);
+  await expect(panel.locator("li", { hasText: "finite strain" })).toContainText(
+    "asked for with all",
+  );
+  await rule("chosen");
+  await settled(retina);
+  const chosen = await retina.evaluate(() => window.retina.answer?.effects);
+  const simulated = chosen?.filter((effect) => effect.simulated).map(({ name }) => name);
+  expect(await asked()).toEqual(simulated);
+  await rule("automatic");
+  await expect.poll(asked).toBe("auto");
+  await settled(retina);
+  // Every number that was decided on is told beside what it was held against.
+  const effects = (await retina.evaluate(() => window.retina.answer?.effects)) ?? [];
+  const judged = effects.filter(
+    ({ value, threshold }) => value !== undefined && threshold !== undefined,
+  );
+  expect(judged.length).toBeGreaterThan(3);
+  for (const { name, reason } of judged) {
+    const note = panel
+      .locator("li", { hasText: name.replaceAll("_", " ") })
+      .first()
+      .locator(".note");
+    await expect(note).toContainText(reason.replaceAll("`", "").slice(0, 20));
+    await expect(note).toContainText(/\(\S+ against \S+\)/);
+  }
+});
+
+test("what a scene has calls for effects, and goes with the link", async ({ retina, server }) => {
+  await open(retina, server, "#level=coarse&force=0.3&tilt=0&x=0&y=0");
+  await retina.getByText("Effects", { exact: true }).click();
+  const panel = retina.locator("[data-panel=effects]");
+  const set = async (label: string, value: string): Promise<void> => {
+    await panel.getByLabel(label, { exact: true }).fill(value);
+    await retina.keyboard.press("Enter");
+    await settled(retina);
+  };
+  const state = (effect: string): ReturnType<typeof panel.locator> =>
+    panel.locator("li", { hasText: effect }).first().locator(".state");
+  const scene = (): Promise<Record<string, unknown>> =>
+    retina.evaluate(() => (window.retina.request?.scene ?? {}) as Record<string, unknown>);
+  await expect(state("bleb")).toHaveText("not simulated");
+  await set("Fluid volume", "0.02");
+  await set("Fluid radius", "0.6");
+  await expect(state("bleb")).toHaveText("simulated");
+  expect((await scene())["bleb"]).toEqual({ volume_mm3: 0.02, radius_mm: 0.6 });
+  const bleb = await retina.evaluate(() => window.retina.answer?.contact.bleb);
+  expect(bleb?.volume_mm3).toBeCloseTo(0.02, 5);
+  expect(bleb?.pressure_mmhg).toBeGreaterThan(1);
+  await expect(panel.locator("#fluid")).toContainText("mmHg");
+  await panel.locator("#fluid").scrollIntoViewIfNeeded();
+  await retina.screenshot({ path: "artefacts/conditions.png" });
+  await expect.poll(() => retina.url()).toContain("scene.bleb.volume_mm3=0.02");
+  await set("Fluid volume", "0");
+  await expect(state("bleb")).toHaveText("not simulated");
+  expect((await retina.evaluate(() => window.retina.request?.scene)) ?? "").toBe("macula");
+
+  await set("Eye pressure", "30");
+  await expect(state("pressure")).toHaveText("simulated");
+  expect((await scene())["pressure_kpa"]).toBeCloseTo(30 * 0.133322, 3);
+  await set("Friction", "0.5");
+  await set("Bond strength", "1");
+  const { tissue, friction_coefficient } = await scene();
+  expect(friction_coefficient).toBe(0.5);
+  expect(tissue).toMatchObject({ bond: { strength_kpa: 1 } });
+  await expect(state("adhesion")).toHaveText("simulated");
+  // Beyond a range the server says what is allowed, and the page says it beside the number.
+  await set("Friction", "7");
+  await expect(panel.locator(".number.wrong")).toContainText("allowed");
+});
+
 test("a number of the tissue changes the answer", async ({ retina }) => {
   const deepest = (): Promise<number> =>
     retina.evaluate(() => Math.max(...(window.retina.answer?.surface.displacement_um ?? [])));

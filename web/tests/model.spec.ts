@@ -114,6 +114,10 @@ test("settings survive the URL", () => {
     parameters: { "scene.tissue.choroid.youngs_modulus_kpa": 12.5 },
   };
   expect(fromHash(`#${toHash(settings)}`)).toEqual(settings);
+  for (const effects of ["all", []] as const) {
+    const other: Settings = { ...INITIAL, effects: effects === "all" ? effects : [...effects] };
+    expect(fromHash(`#${toHash(other)}`)).toEqual(other);
+  }
   expect(fromHash("")).toEqual(INITIAL);
   expect(toHash(INITIAL)).toBe("");
   expect(fromHash("#x=nonsense&tip=spoon&force=1")).toEqual({ ...INITIAL, forceMn: 1 });

@@ -26,12 +26,12 @@ pub const NAME: &str = "pressure";
 const POINTS_PER_EDGE: usize = 3;
 
 /// Value and two slopes of every node's shape function at one point of the reference face, and the point's weight.
-struct FacePoint {
-    weight: f64,
-    values: [[f64; FACE_NODES]; 3],
+pub(super) struct FacePoint {
+    pub(super) weight: f64,
+    pub(super) values: [[f64; FACE_NODES]; 3],
 }
 
-static FACE_POINTS: LazyLock<Vec<FacePoint>> = LazyLock::new(|| {
+pub(super) static FACE_POINTS: LazyLock<Vec<FacePoint>> = LazyLock::new(|| {
     let rule = gauss_rule(POINTS_PER_EDGE);
     let pairs = rule.iter().flat_map(|&(eta, w_eta)| rule.iter().map(move |&(xi, w_xi)| (xi, eta, w_xi * w_eta)));
     let point = |(xi, eta, weight): (f64, f64, f64)| {

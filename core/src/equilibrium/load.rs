@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Unit, Vector3};
 
-use crate::effect::Effect;
+use crate::effect::{Effect, Multiplier};
 use crate::mesh::disc::DiscGeometry;
 use crate::mesh::wall::Place;
 use crate::needle::Body;
@@ -94,6 +94,13 @@ pub struct Load<'a> {
     pub touch_mm: f64,
     /// What acts besides the needle's contact.
     pub additions: &'a [Addition<'a>],
+}
+
+impl Load<'_> {
+    /// The multipliers of what acts.
+    pub(super) fn multipliers(&self) -> impl Iterator<Item = &Multiplier> {
+        self.additions.iter().filter_map(|addition| addition.effect.multiplier())
+    }
 }
 
 /// An equilibrium.

@@ -24,6 +24,8 @@ pub struct DiscGeometry {
     pub center: [f64; 2],
     /// Outer radius of the core and of each ring (mm): `rings` + 1 ascending numbers.
     pub radii: Vec<f64>,
+    /// How far the middle of each ring's outer circle lies from the centre (mm); none: all circles have one centre. Circles must not cross.
+    pub offsets: Vec<[f64; 2]>,
 }
 
 /// How much of the core's outline is the circle's rather than the square's: a full circle would flatten the corner cells.
@@ -113,14 +115,19 @@ impl DiscTopology {
             let (ring, part) = ((line - 1) / ORDER, ((line - 1) % ORDER + 1) as f64 / ORDER as f64);
             for step in 0..self.around() {
                 let angle = -0.75 * PI + 2.0 * PI * step as f64 / self.around() as f64;
-                let circle = |radius: f64| [radius * angle.cos(), radius * angle.sin()];
-                let outer = circle(geometry.radii[ring + 1]);
+                let circle = |ring: usize| {
+                    let [x, y] =
+                        ring.checked_sub(1).and_then(|at| geometry.offsets.get(at)).copied().unwrap_or_default();
+                    let radius = geometry.radii[ring];
+                    [radius * angle.cos() + x, radius * angle.sin() + y]
+                };
+                let outer = circle(ring + 1);
                 let inner = if ring == 0 {
                     let outline = self.outline(step);
                     let at = positions[outline];
                     [at[0] - geometry.center[0], at[1] - geometry.center[1]]
                 } else {
-                    circle(geometry.radii[ring])
+                    circle(ring)
                 };
                 positions.push(place([0, 1].map(|k| inner[k] + part * (outer[k] - inner[k]))));
             }

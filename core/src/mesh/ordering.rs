@@ -16,7 +16,7 @@ pub fn nested_dissection(topology: &DiscTopology) -> Vec<usize> {
     // Rings of equal width: distances then count cells, whatever the grading of the actual mesh.
     let core = topology.core_cells as f64 / 2.0;
     let radii = (0..=topology.rings).map(|ring| core + ring as f64).collect();
-    let positions = topology.positions(&DiscGeometry { center: [0.0, 0.0], radii });
+    let positions = topology.positions(&DiscGeometry { center: [0.0, 0.0], radii, offsets: Vec::new() });
     let cells = topology.cells();
     let centers: Vec<[f64; 2]> = cells
         .iter()

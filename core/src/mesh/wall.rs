@@ -205,6 +205,11 @@ impl WallTopology {
         })
     }
 
+    /// Lattice levels from the base up to the lower side of the interface, it included.
+    pub fn levels_below_interface(&self) -> usize {
+        self.division.elements_below_interface() * ORDER + 1
+    }
+
     /// Index of the needle's vertex.
     pub fn needle(&self) -> usize {
         self.vertices.len()

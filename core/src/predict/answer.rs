@@ -15,7 +15,7 @@ use super::topologies::shared_topology;
 use super::types::{ContactReport, ContactState, Level, NeedleOutcome, PredictError, Prediction, SolverReport};
 use super::{PENETRATION_WARNING_MM, RIM_WARNING_MM, Workspace};
 use crate::effects::puncture::{Burden, Nearest};
-use crate::effects::{adhesion, contact, friction, puncture, tool_flex};
+use crate::effects::{adhesion, bleb, contact, friction, puncture, tool_flex};
 use crate::equilibrium::settled::Settled;
 use crate::equilibrium::{Solid, Tool};
 use crate::patch::vertex_normals;
@@ -35,12 +35,18 @@ impl Question<'_> {
             Begun::Pressed(linear) => linear,
             Begun::Still(why) => {
                 let decision = self.decide(self.unpressed(&sink), &sink)?;
+                if decision.bleb {
+                    return self.over_fluid(resolution, decision, &sink, why, progress);
+                }
                 return Ok(self.at_rest(decision, sink.change_kpa, why));
             }
         };
         let strain = linear.depth_mm / self.yielding_mm();
         let expected = self.expected(&linear, &sink);
         let decision = self.decide(expected, &sink)?;
+        if !decision.contact && decision.bleb {
+            return self.over_fluid(resolution, decision, &sink, "contact is not simulated", progress);
+        }
         if !decision.contact {
             return Ok(self.at_rest(decision, sink.change_kpa, "contact is not simulated"));
         }
@@ -131,6 +137,7 @@ impl Question<'_> {
                 least_volume_ratio: None,
                 slipping_share: None,
                 bond_damage: None,
+                bleb: None,
                 puncture_share: 0.0,
             },
             solver: SolverReport::default(),
@@ -172,6 +179,7 @@ impl Question<'_> {
             friction_coefficient: decision.friction.then_some(self.prepared.scene.friction_coefficient),
             pressure_kpa,
             bond: decision.adhesion.then_some(self.prepared.scene.tissue.bond),
+            bleb: self.bleb().filter(|_| decision.bleb),
         }
     }
 
@@ -184,7 +192,15 @@ impl Question<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
-        let topology = shared_topology(resolution.division(&self.prepared.scene.tissue, decision.adhesion))?;
+        let over_fluid;
+        let resolution = match decision.bleb {
+            true => {
+                over_fluid = resolution.over_fluid();
+                &over_fluid
+            }
+            false => resolution,
+        };
+        let topology = shared_topology(resolution.division(&self.prepared.scene.tissue, decision.parts()))?;
         let (_, solver) = match &mut workspace.coarse {
             Some(kept) if Arc::ptr_eq(&kept.0, &topology) => kept,
             slot => {
@@ -209,7 +225,7 @@ impl Question<'_> {
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
         let coarse = self.coarse(&COARSE, linear, decision, change_kpa, workspace, progress)?;
-        let topology = shared_topology(resolution.division(&self.prepared.scene.tissue, decision.adhesion))?;
+        let topology = shared_topology(resolution.division(&self.prepared.scene.tissue, decision.parts()))?;
         let mut solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
         let mut bench =
             Bench { level: Level::Reference.name(), resolution, topology: &topology, workspace: &mut solver };
@@ -227,12 +243,8 @@ impl Question<'_> {
 
     /// The answer without contact: the surface at rest, or where the pressure moves it.
     pub(crate) fn at_rest(&self, mut decision: Decision, change_kpa: Option<f64>, reason: &str) -> Prediction {
-        for report in &mut decision.reports {
-            if [contact::NAME, friction::NAME, adhesion::NAME, tool_flex::NAME].contains(&report.name) {
-                report.simulated = false;
-                report.reason = reason.to_owned();
-            }
-        }
+        decision.without(&[contact::NAME, friction::NAME, adhesion::NAME, tool_flex::NAME], reason);
+        let lifted = decision.reports.iter().any(|report| report.name == bleb::NAME && report.value > report.threshold);
         let settled = self.settled(change_kpa, decision.solid);
         let moved = |&parameter: &[f64; 2]| self.sunk(settled.as_ref(), parameter);
         let answer = FiniteElementAnswer {
@@ -249,6 +261,7 @@ impl Question<'_> {
                 least_volume_ratio: None,
                 slipping_share: None,
                 bond_damage: None,
+                bleb: None,
                 puncture_share: 0.0,
             },
             solver: SolverReport::default(),
@@ -262,6 +275,7 @@ impl Question<'_> {
         };
         let expected = match settled {
             Some(_) => ExpectedError::UNKNOWN,
+            None if lifted => ExpectedError::UNKNOWN,
             // Nothing moves, exactly.
             None => ExpectedError { median_um: 0.0, p95_um: 0.0, calibrated: true },
         };
@@ -272,7 +286,7 @@ impl Question<'_> {
     fn judge(&self, answer: &mut FiniteElementAnswer, decision: &mut Decision) -> Option<String> {
         let limits = self.puncture_limits();
         let burden = match answer.contact.state {
-            ContactState::Clear => Burden::default(),
+            ContactState::Clear if answer.contact.bleb.is_none() => Burden::default(),
             _ => Burden { force_mn: answer.reaction_mn.norm(), strain: answer.contact.max_strain },
         };
         for report in decision.reports.iter_mut().filter(|report| report.name == puncture::NAME) {
@@ -302,10 +316,9 @@ impl Question<'_> {
         let direction = frame * self.motion.direction.into_inner();
         let mut warnings = Vec::new();
         warnings.extend(self.judge(&mut answer, &mut decision));
-        let unused = decision.reports.iter().find(|r| !r.simulated && r.value > r.threshold && r.value.is_some());
-        if let Some(effect) = unused {
-            warnings.push(format!("`{}` is not simulated though the scene calls for it", effect.name));
-        }
+        warnings.extend(answer.contact.bleb.and_then(|bleb| self.peeling(bleb.pressure_kpa, bleb.volume_mm3)));
+        let unused = decision.reports.iter().filter(|r| !r.simulated && r.value > r.threshold && r.value.is_some());
+        warnings.extend(unused.map(|r| format!("`{}` is not simulated though the scene calls for it", r.name)));
         let penetration_mm = answer.contact.max_penetration_mm;
         if penetration_mm > PENETRATION_WARNING_MM {
             warnings.push(format!(

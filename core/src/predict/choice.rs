@@ -1,6 +1,7 @@
 //! Which effects a request calls for, and why. Solid and contact here, every other effect's criterion in a file of its own.
 
 pub mod adhesion;
+pub mod bleb;
 mod criterion;
 pub mod friction;
 pub mod pressure;
@@ -32,10 +33,36 @@ pub struct Decision {
     pub friction: bool,
     /// Whether the retina can come off.
     pub adhesion: bool,
+    /// Whether there is fluid under the retina.
+    pub bleb: bool,
     /// Whether the needle's shaft bends.
     pub tool_flex: bool,
     /// The report, in the order of [`EFFECT_NAMES`].
     pub reports: Vec<EffectReport>,
+}
+
+impl Decision {
+    /// Whether retina and choroid may come apart.
+    pub fn parts(&self) -> bool {
+        self.adhesion || self.bleb
+    }
+
+    /// Tells of these effects that they are not simulated, for this reason.
+    pub fn without(&mut self, names: &[&str], reason: &str) {
+        for report in self.reports.iter_mut().filter(|report| names.contains(&report.name)) {
+            report.simulated = false;
+            report.reason = reason.to_owned();
+        }
+    }
+
+    /// Takes in what is decided of the scene's fluid, which acts before anything is pressed.
+    pub fn with_bleb(mut self, bleb: EffectReport) -> Self {
+        self.bleb = bleb.simulated;
+        if let Some(place) = self.reports.iter_mut().find(|report| report.name == bleb.name) {
+            *place = bleb;
+        }
+        self
+    }
 }
 
 /// What the linear answer predicts.
@@ -55,7 +82,7 @@ pub struct Expected {
     pub limits: Limits,
 }
 
-/// Decides for `choice` at `level`; `pressure` is what was decided about it before anything was pressed.
+/// Decides for `choice` at `level`; `pressure` is what was decided about it before anything was pressed. Of a scene without fluid: see [`Decision::with_bleb`].
 ///
 /// # Errors
 /// [`PredictError::Effect`] for a name that does not exist or a list without a solid.
@@ -124,6 +151,7 @@ pub fn decide(
         friction::report(choice, level, contact, &expected.sliding),
         pressure.clone(),
         adhesion::report(choice, level, contact, &expected.pull),
+        bleb::report(choice, level, None),
         plain(viscoelasticity::NAME, false, STATIC),
         plain(inertia::NAME, false, STATIC),
         tool_flex::report(choice, level, contact, &expected.bending),
@@ -147,6 +175,7 @@ pub fn decide(
         contact,
         friction: is_on(effects::friction::NAME),
         adhesion: is_on(effects::adhesion::NAME),
+        bleb: false,
         tool_flex: is_on(effects::tool_flex::NAME),
         reports,
     })

@@ -50,6 +50,8 @@ pub struct Situation {
     pub sampled: bool,
     /// Expected deflection of the tip, where the bending of the shaft is called for (µm).
     pub deflection_um: f64,
+    /// Whether fluid under the retina is called for, over which no error was measured.
+    pub lifted: bool,
     /// What level `network` expects of its own answer; `None` where it has none.
     pub network: Option<ExpectedError>,
     /// The same of level `corrected`.
@@ -97,6 +99,7 @@ impl Situation {
             strain,
             sampled,
             deflection_um: 0.0,
+            lifted: false,
             network: None,
             corrected: None,
         }
@@ -104,6 +107,9 @@ impl Situation {
 
     /// The expected error of `level` here.
     pub fn expected_error(&self, level: Level) -> ExpectedError {
+        if self.lifted {
+            return ExpectedError::UNKNOWN;
+        }
         if self.depth_um == 0.0 {
             // Nothing moves, exactly.
             return ExpectedError { median_um: 0.0, p95_um: 0.0, calibrated: true };

@@ -2,10 +2,11 @@
 
 use nalgebra::Vector3;
 
+use super::held::Held;
+use super::over_fluid::around_bleb;
 use super::types::{ContactReport, ContactState, PredictError, SolverReport};
-use crate::effect::Local;
-use crate::effects::adhesion::{Adhesion, Bond, Interface, STIFFNESS_KPA_PER_MM};
 use crate::effects::pressure::Pressure;
+use crate::equilibrium::bleb::Bleb;
 use crate::equilibrium::friction::FrictionError;
 use crate::equilibrium::settled::Settled;
 use crate::equilibrium::{
@@ -86,6 +87,11 @@ pub const REFERENCE: Resolution = Resolution {
 };
 
 impl Resolution {
+    /// As fine as a detached disc needs at least: three rings within its edge and three around it.
+    pub fn over_fluid(&self) -> Resolution {
+        Resolution { rings: self.rings.max(6), ..*self }
+    }
+
     /// The mesh division for `tissue`; with an interface under the retina if it is `parting`.
     pub fn division(&self, tissue: &Tissue, parting: bool) -> WallDivision {
         let sublayers = tissue.retina.len();
@@ -127,7 +133,7 @@ pub struct ContactEstimate {
 /// Thickness of the innermost element of the retina, in contact radii over the number of elements through it.
 const FIRST_ELEMENT_PER_CONTACT: f64 = 2.0;
 /// Smallest contact radius that a mesh is made for, in needle radii.
-const SMALLEST_CONTACT: f64 = 0.05;
+pub(super) const SMALLEST_CONTACT: f64 = 0.05;
 /// Depth of the linear answer, in smoothing distances of the contact, below which the needle hardly moves the tissue.
 const LIGHT_PER_SMOOTHING: f64 = 0.1;
 /// Share of the normal force on slipping tissue above which a contact counts as slipping.
@@ -180,6 +186,8 @@ pub struct Problem<'a> {
     pub pressure_kpa: Option<f64>,
     /// The retina's bond, where it can part.
     pub bond: Option<RetinalBond>,
+    /// Fluid under the retina, where it is simulated.
+    pub bleb: Option<Bleb>,
 }
 
 impl Problem<'_> {
@@ -194,11 +202,12 @@ impl Problem<'_> {
         // Zero without grading, and then without a trace.
         let graded = |share: f64| rings * (share.powf(resolution.ring_grading) - share);
         let radius = |ring: usize| core * ratio.powi(ring as i32) * ratio.powf(graded(ring as f64 / rings));
-        let radii = (0..=resolution.rings).map(radius).collect();
-        MeshSize {
-            disc: DiscGeometry { center: estimate.center, radii },
-            first_element_mm: FIRST_ELEMENT_PER_CONTACT * contact / resolution.retina_elements as f64,
-        }
+        let center = estimate.center;
+        let disc = match &self.bleb {
+            Some(bleb) => around_bleb(bleb, center, core, rim, resolution.rings),
+            None => DiscGeometry { center, radii: (0..=resolution.rings).map(radius).collect(), offsets: Vec::new() },
+        };
+        MeshSize { disc, first_element_mm: FIRST_ELEMENT_PER_CONTACT * contact / resolution.retina_elements as f64 }
     }
 
     /// Solves on a mesh around the estimated contact, from the displacements `start` (patch parameters and depth in layers
@@ -215,29 +224,22 @@ impl Problem<'_> {
     ) -> Result<FiniteElementAnswer, PredictError> {
         progress.stage("mesh");
         let Bench { level, resolution, topology, workspace } = bench;
+        self.check_on_bleb(resolution, estimate)?;
         let wall = self.wall(topology, resolution, &self.mesh(resolution, estimate))?;
         let (motion, touch_mm) = self.aimed(&wall, resolution, estimate);
         let mut positions = wall.displaced(start);
         wall.place_tip(&mut positions, &(motion.direction.into_inner() * motion.travel_mm + estimate.deflection));
         progress.stage("equilibrium");
         let pressure = self.pressure_kpa.map(|pressure_kpa| Pressure { pressure_kpa });
-        let interface = self.bond.map(|bond| (bond, Interface::new(&topology.interface, &wall.geometry.rest)));
-        let intact =
-            vec![0.0; interface.as_ref().map_or(0, |(_, interface)| interface.points()) * topology.interface.len()];
-        let adhesion = interface.as_ref().map(|(bond, interface)| Adhesion {
-            interface,
-            bond: Bond {
-                strength_kpa: bond.strength_kpa,
-                fracture_energy_mn_per_mm: bond.fracture_energy_mn_per_mm,
-                stiffness_kpa_per_mm: STIFFNESS_KPA_PER_MM,
-            },
-            largest_mm: &intact,
-        });
+        let held = Held::new(self, &wall);
+        let adhesion = held.as_ref().map(Held::adhesion);
+        let fluid = held.as_ref().and_then(|held| held.fluid(self));
         let mut additions: Vec<Addition> =
             pressure.iter().map(|effect| Addition { effect, place: Place::Faces }).collect();
         additions.extend(adhesion.iter().map(|effect| Addition { effect, place: Place::Interface }));
+        additions.extend(fluid.iter().map(|effect| Addition { effect, place: Place::Interface }));
         let load = Load { motion: &motion, touch_mm, additions: &additions };
-        let failed = |cause| PredictError::Solver { level, cause };
+        let failed = |cause| self.failed(level, cause);
         let (equilibrium, rubbing) = match self.friction_coefficient {
             None => (wall.solve(&load, positions, workspace, progress).map_err(failed)?, None),
             Some(coefficient) => {
@@ -258,7 +260,9 @@ impl Problem<'_> {
                 answer.contact.state = ContactState::Slipping;
             }
         }
-        answer.contact.bond_damage = adhesion.map(|adhesion| damage(&adhesion, topology, &equilibrium.positions));
+        let positions = &equilibrium.positions;
+        answer.contact.bond_damage = held.as_ref().zip(self.bond).map(|(held, _)| held.damage(&wall, positions));
+        answer.contact.bleb = fluid.map(|fluid| self.told_of(&fluid, &wall, positions));
         Ok(answer)
     }
 
@@ -291,6 +295,9 @@ impl Problem<'_> {
         )?;
         if let (Some(settled), Some(pressure_kpa)) = (self.settled(resolution), self.pressure_kpa) {
             wall.settle(&self.patch.surface, &settled, pressure_kpa);
+        }
+        if let Some(bleb) = &self.bleb {
+            wall.raise(bleb, |[x, y]| self.patch.surface.column(x, y).inward.into_inner());
         }
         Ok(wall)
     }
@@ -369,18 +376,6 @@ impl Problem<'_> {
     }
 }
 
-/// The largest damage of the bond at `positions`.
-fn damage(adhesion: &Adhesion, topology: &WallTopology, positions: &[f64]) -> f64 {
-    let mut current = vec![0.0; 3 * topology.interface.group_size];
-    let mut largest: f64 = 0.0;
-    for group in 0..topology.interface.len() {
-        topology.interface.gather(group, positions, &mut current);
-        let local = Local { current: &current, group, predicted: &[] };
-        largest = adhesion.openings(&local).fold(largest, f64::max);
-    }
-    adhesion.bond.damage(largest)
-}
-
 fn report(summary: &ContactSummary, strains: &Strains) -> ContactReport {
     ContactReport {
         state: if summary.area_mm2 > 0.0 { ContactState::Touching } else { ContactState::Clear },
@@ -391,6 +386,7 @@ fn report(summary: &ContactSummary, strains: &Strains) -> ContactReport {
         least_volume_ratio: Some(strains.least_volume_ratio),
         slipping_share: None,
         bond_damage: None,
+        bleb: None,
         puncture_share: 0.0,
     }
 }

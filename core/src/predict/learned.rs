@@ -1,7 +1,7 @@
 //! The learned levels: the linear answer, or that of `coarse`, with what a network adds to it.
 //!
 //! A network answers for what it was trained on: one layer of retina on choroid and sclera, a rigid needle without friction, the pressure of rest, an intact
-//! bond, a shaft that does not bend, finite strain. Anything else is refused by name, and a budget does not choose the level there.
+//! bond without fluid under it, a shaft that does not bend, finite strain. Anything else is refused by name, and a budget does not choose the level there.
 //!
 //! `network` was trained under a given force. For a needle that is held where it is, the force is sought whose travel is the needle's own.
 
@@ -14,7 +14,7 @@ use super::finite_element::{COARSE, ContactEstimate, FiniteElementAnswer};
 use super::linear::{LinearAnswer, Load, Press};
 use super::question::{Question, Sink};
 use super::types::{ContactReport, ContactState, Level, PredictError, SolverReport};
-use crate::effects::{adhesion, friction, pressure};
+use crate::effects::{adhesion, bleb, friction, pressure};
 use crate::network::contact::{Corrected, Memory};
 use crate::network::graph::Graph;
 use crate::network::input::{Answer, Field, Input, TissueNumbers};
@@ -57,11 +57,15 @@ fn answer_of(answer: &FiniteElementAnswer) -> Answer {
 
 impl Question<'_> {
     /// Why `level` has no answer for this request under `decision`, if it has none.
-    fn check_learned(&self, level: Level, decision: &Decision, sink: &Sink) -> Result<(), PredictError> {
+    pub(super) fn check_learned(&self, level: Level, decision: &Decision, sink: &Sink) -> Result<(), PredictError> {
+        if !level.is_learned() {
+            return Ok(());
+        }
         self.prepared.networks.of(level)?;
         let simulated = [
             (decision.friction, friction::NAME),
             (decision.adhesion, adhesion::NAME),
+            (self.lifting(level).simulated, bleb::NAME),
             (sink.change_kpa.is_some(), pressure::NAME),
         ];
         if let Some((_, name)) = simulated.into_iter().find(|(on, _)| *on) {
@@ -235,6 +239,7 @@ impl Question<'_> {
             least_volume_ratio: None,
             slipping_share: None,
             bond_damage: None,
+            bleb: None,
             puncture_share: 0.0,
         };
         let answer = self.learned(&corrected, contact, SolverReport::default(), self.estimate(linear, false), force_mn);

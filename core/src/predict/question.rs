@@ -9,6 +9,7 @@ use super::types::{Control, EffectChoice, EffectReport, Level, PredictError, Req
 use super::{MAX_DEPTH_SHARE, MAX_SETTLED_STRAIN, PUNCTURE_PRESSURE_PER_MODULUS, PreparedScene};
 use crate::effects::finite_strain;
 use crate::effects::puncture::Limits;
+use crate::equilibrium::bleb::Bleb;
 use crate::equilibrium::settled::Settled;
 use crate::equilibrium::{Motion, Solid, Tool};
 use crate::needle::Body;
@@ -66,13 +67,15 @@ pub(super) enum Begun<'a> {
     Pressed(LinearAnswer<'a>),
 }
 
-/// What the eye's pressure does by itself.
+/// What the eye's pressure and fluid under the retina do by themselves.
 pub(crate) struct Sink {
     /// The decision about the effect.
     pub(crate) report: EffectReport,
     /// Change of the pressure (kPa), where it is simulated.
     pub(super) change_kpa: Option<f64>,
-    /// Largest sinking of a node that is expected of it, in magnitude (mm); 0 where it is not simulated.
+    /// Fluid under the retina, where it is simulated.
+    pub(super) bleb: Option<Bleb>,
+    /// Largest sinking and rising of a node that is expected of them, in magnitude (mm); 0 where they are not simulated.
     pub(super) expected_mm: f64,
 }
 
@@ -96,6 +99,7 @@ impl Question<'_> {
 
     /// The linear answer, or why nothing moves.
     pub(super) fn begin(&self, tool: &Tool) -> Result<Begun<'_>, PredictError> {
+        self.check_bleb()?;
         if self.motion.force_mn == Some(0.0) {
             return Ok(Begun::Still("no force is applied"));
         }
@@ -114,6 +118,8 @@ impl Question<'_> {
             situation.sampled = false;
             situation.deflection_um = bending.deflection_um();
         }
+        // No error was measured over fluid.
+        situation.lifted = self.lifting(Level::Coarse).simulated;
         situation
     }
 
@@ -123,7 +129,7 @@ impl Question<'_> {
         Situation::new(&self.prepared.scene, &self.request.needle.shape, angle_deg, depth_mm, strain)
     }
 
-    /// What the eye's pressure does by itself.
+    /// What the eye's pressure and fluid under the retina do by themselves.
     pub(crate) fn sink(&self) -> Sink {
         let Scene { tissue, .. } = &self.prepared.scene;
         let change_kpa = self.prepared.scene.pressure_change_kpa();
@@ -139,8 +145,10 @@ impl Question<'_> {
         let sink_mm = if finite.abs() > linear.abs() { finite } else { linear };
         let report = pressure::report(&self.request.effects, change_kpa, sink_mm * 1e3);
         let simulated = report.simulated;
-        let expected_mm = if simulated { sink_mm.abs() } else { 0.0 };
-        Sink { report, change_kpa: simulated.then_some(change_kpa), expected_mm }
+        let bleb = self.bleb().filter(|_| self.lifting(self.request.level).simulated);
+        let rise_mm = bleb.map_or(0.0, |bleb| bleb.expected_rise_mm(bleb.center));
+        let expected_mm = if simulated { sink_mm.abs() } else { 0.0 } + rise_mm;
+        Sink { report, change_kpa: simulated.then_some(change_kpa), bleb, expected_mm }
     }
 
     pub(super) fn decide(&self, expected: Expected, sink: &Sink) -> Result<Decision, PredictError> {
@@ -153,7 +161,8 @@ impl Question<'_> {
             );
             return Err(PredictError::Effect { name: crate::effects::pressure::NAME.to_owned(), problem });
         }
-        decide(&self.request.effects, self.request.level, expected, &sink.report)
+        let decision = decide(&self.request.effects, self.request.level, expected, &sink.report)?;
+        Ok(decision.with_bleb(self.lifting(self.request.level)))
     }
 
     /// The surface far from the needle under the pressure, by the law of `solid`.
@@ -169,9 +178,14 @@ impl Question<'_> {
         })
     }
 
-    /// The tool as it stands to the surface at rest: raised by what the surface under it has sunk.
+    /// The tool as it stands to the surface at rest: raised by what the surface under it has sunk, lowered by what fluid has raised it.
     pub(super) fn raised(&self, sink: &Sink) -> Tool<'_> {
         let mut tool = self.tool;
+        if let Some(bleb) = &sink.bleb {
+            let at = tool.patch_from_needle.translation.vector;
+            let inward = self.patch().surface.column(at.x, at.y).inward.into_inner();
+            tool.patch_from_needle.translation.vector += inward * bleb.expected_rise_mm([at.x, at.y]);
+        }
         if sink.change_kpa.is_some() {
             // What `decide` will find unless the sinking itself is small.
             let finite = match &self.request.effects {

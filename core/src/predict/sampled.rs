@@ -2,7 +2,7 @@
 //!
 //! A number of the tissue has a *place* in its range: 0 the default, −1 and 1 the ends, between them straight or, for moduli, in the logarithm.
 //! Sampled are places to ±[`INNER`]. The tissue has one layer of retina and no membrane, the surface is a built-in one, nothing rubs, and the eye has the pressure
-//! at which the surface was measured. Units: mm, degrees.
+//! at which the surface was measured, and there is no fluid under it. Units: mm, degrees.
 //!
 //! Not here: how often each is drawn (the data sets), what the errors are (`expected_error`).
 
@@ -66,6 +66,7 @@ pub fn has_scene(scene: &Scene) -> bool {
     !matches!(scene.surface, SceneSurface::Mesh(_))
         && scene.friction_coefficient == 0.0
         && scene.pressure_change_kpa() == 0.0
+        && scene.bleb.is_none_or(|fluid| fluid.is_empty())
         && alike.any(|known| has_tissue(&known, &scene.tissue))
 }
 

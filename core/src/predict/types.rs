@@ -127,8 +127,19 @@ pub struct ContactReport {
     pub slipping_share: Option<f64>,
     /// Largest share of the strength that the retina's bond has lost anywhere, 0 intact to 1 parted; where adhesion is simulated.
     pub bond_damage: Option<f64>,
+    /// Fluid under the retina, where it is simulated.
+    pub bleb: Option<BlebReport>,
     /// Force and strain over what the tissue bears, the larger of the two: above 1 it counts as punctured.
     pub puncture_share: f64,
+}
+
+/// Fluid under the retina at equilibrium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlebReport {
+    /// Its pressure above that in the eye (kPa).
+    pub pressure_kpa: f64,
+    /// Its volume (mm³).
+    pub volume_mm3: f64,
 }
 
 /// One effect: simulated or not, and why.
@@ -277,6 +288,42 @@ pub enum PredictError {
         level: &'static str,
         /// What failed.
         cause: FrictionError,
+    },
+    /// The detached disc does not lie under the patch.
+    #[error(
+        "the middle of the bleb lies at ({x_mm:.3}, {y_mm:.3}) mm of the patch frame, outside of the patch (at most {limit_mm} mm from its centre in x and y)"
+    )]
+    BlebOutsidePatch {
+        /// Middle of the bleb, patch frame (mm).
+        x_mm: f64,
+        /// Middle of the bleb, patch frame (mm).
+        y_mm: f64,
+        /// Largest allowed coordinate (mm).
+        limit_mm: f64,
+    },
+    /// The contact is not over the fluid: no mesh resolves both it and the edge of the detached disc.
+    #[error(
+        "`bleb` needs a contact over its fluid: this one, of {core_mm:.3} mm radius in the mesh, lies {away_mm:.3} mm from its middle (both lengths together at most {most_mm:.3} mm); leave it out of `effects` to press beside it"
+    )]
+    BesideBleb {
+        /// Radius of the mesh's core around the contact (mm).
+        core_mm: f64,
+        /// Distance of the contact's centre from the bleb's (mm).
+        away_mm: f64,
+        /// Radius of the bleb (mm).
+        radius_mm: f64,
+        /// Largest sum of the first two (mm).
+        most_mm: f64,
+    },
+    /// The equilibrium with fluid under the retina was not found.
+    #[error("no equilibrium at level `{level}` with `bleb` ({held}): {cause}")]
+    Bleb {
+        /// The level.
+        level: &'static str,
+        /// What was held of the fluid.
+        held: String,
+        /// The last attempt's failure.
+        cause: NewtonError,
     },
     /// The level's network cannot be used.
     #[error("level `{level}`: {cause}")]

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use super::Sequence;
 use super::plan::Plan;
 use crate::effects::viscoelasticity::Network;
-use crate::effects::{adhesion, friction, inertia, pressure, viscoelasticity};
+use crate::effects::{adhesion, bleb, friction, inertia, pressure, viscoelasticity};
 use crate::predict::choice::{Decision, decide as decide_static};
 use crate::predict::{EffectChoice, EffectReport, PredictError, PreparedScene};
 use crate::tissue::{LayerKind, Tissue};
@@ -51,7 +51,7 @@ pub(super) fn slowest_period_s(tissue: &Tissue) -> f64 {
 }
 
 /// Effects of single equilibria that a sequence leaves out, and says so.
-const STATIC_ONLY: [&str; 3] = [friction::NAME, pressure::NAME, adhesion::NAME];
+const STATIC_ONLY: [&str; 4] = [friction::NAME, pressure::NAME, adhesion::NAME, bleb::NAME];
 
 /// Decides for the whole sequence.
 ///
@@ -71,6 +71,8 @@ pub(super) fn decide(
     let mut decision = decide_static(&sequence.effects, sequence.level, plan.deepest, &plan.pressure)?;
     decision.friction = false;
     decision.adhesion = false;
+    decision = decision.with_bleb(prepared.lifting(&sequence.effects, sequence.level));
+    decision.bleb = false;
     for report in decision.reports.iter_mut().filter(|report| STATIC_ONLY.contains(&report.name) && report.simulated) {
         report.simulated = false;
         report.reason += "; not simulated in a sequence";

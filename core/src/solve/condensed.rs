@@ -104,7 +104,8 @@ impl System<'_> {
         let size = self.dofs.tail;
         let (free, tail) = (self.dofs.free, self.tail());
         let first = free - size;
-        if size == 0 || workspace.condensed.whole.nrows() != size {
+        // What is held at a value ties the tail to all that is below: its multiplier would be one unknown more here.
+        if size == 0 || workspace.condensed.whole.nrows() != size || !workspace.held.slope.is_empty() {
             return Ok(None);
         }
         let gradient = tail.gradient(positions, &mut workspace.scratch);

@@ -113,6 +113,13 @@ impl Trial {
             force_scale_mn: settings.force_scale_mn,
         }
     }
+
+    /// Takes the potential at `positions` anew: a multiplier has changed.
+    pub fn renew(&mut self, system: &System, positions: &[f64], workspace: &mut Workspace) {
+        if self.globalization == Globalization::LineSearch {
+            self.potential = system.potential(positions, &self.start, self.drive, &mut workspace.scratch);
+        }
+    }
 }
 
 impl System<'_> {

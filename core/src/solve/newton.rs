@@ -8,6 +8,8 @@
 //! Near the end the Hessian hardly changes any more: there the last factor is used again for as long as it pays (chord steps), at a fraction of the cost
 //! of a new one.
 //!
+//! What an effect holds at a value (an enclosed volume) is one equation more, and its multiplier one unknown more (`held.rs`).
+//!
 //! How a step is used, and kept from going astray, is [`Globalization`]'s business (`globalization.rs`).
 //!
 //! An unconverged state is an error with its residual, never an answer.
@@ -22,6 +24,7 @@ use super::border::Reduced;
 use super::condensed::Condensed;
 pub use super::globalization::Globalization;
 use super::globalization::{Step, Trial};
+use super::held::{Border, Held};
 use super::sparse::{Factor, LinearSolveError, SymbolicFactor, norm};
 use crate::assemble::{Dofs, Pattern, Scratch, energy, gradient};
 use crate::effect::Term;
@@ -146,6 +149,7 @@ pub struct Workspace {
     pub(super) factor: Factor,
     pub(super) values: Vec<f64>,
     pub(super) residual: Vec<f64>,
+    pub(super) held: Held,
     pub(super) scratch: Scratch,
     pub(super) condensed: Condensed,
 }
@@ -157,6 +161,7 @@ impl Workspace {
             factor: Factor::new(symbolic),
             values: vec![0.0; pattern.len()],
             residual: vec![0.0; pattern.free + 3],
+            held: Held::default(),
             scratch: Scratch::default(),
             condensed: Condensed::default(),
         }
@@ -188,7 +193,8 @@ impl System<'_> {
             *r -= load;
         }
         let along = drive.out_of_balance(&Vector3::from_row_slice(&workspace.residual[free..]));
-        along.into_iter().fold(norm(&workspace.residual[..free]), f64::hypot)
+        let forces = along.into_iter().fold(norm(&workspace.residual[..free]), f64::hypot);
+        self.hold(positions, workspace).map_or(forces, |missing_mn| forces.hypot(missing_mn))
     }
 
     /// Solves for equilibrium from `positions`, which hold the answer on success.
@@ -224,6 +230,10 @@ impl System<'_> {
             report.shifts += weakened;
             let (plain, slope) = self.step(drive, settings.max_travel_mm, workspace)?;
             report.iterations += 1;
+            if let Some(&change) = plain.get(self.dofs.free + 3) {
+                self.change_multiplier(change);
+                trial.renew(self, positions, workspace);
+            }
             let plain = Step { step: plain, slope, number: report.iterations, weakened: weakened > 0, refined: false };
             // Tissue about to buckle is not what its changed Hessian says: there the contact is left to the iteration.
             match weakened {
@@ -284,6 +294,8 @@ impl System<'_> {
         let (plain, _) = self.step(drive, settings.max_travel_mm, workspace)?;
         let refined = self.refine(&before, &plain, drive, settings.max_travel_mm, workspace)?;
         let step = refined.unwrap_or(plain);
+        let change = step.get(self.dofs.free + 3).copied().unwrap_or_default();
+        self.change_multiplier(change);
         self.dofs.advance(positions, &step, 1.0);
         let residual_mn = self.residual(positions, drive, workspace);
         report.chords += 1;
@@ -293,12 +305,13 @@ impl System<'_> {
             report.residual_mn = residual_mn;
         } else {
             positions.copy_from_slice(&before);
+            self.change_multiplier(-change);
             report.residual_mn = self.residual(positions, drive, workspace);
         }
         Ok(pays)
     }
 
-    /// The Newton step (free unknowns, then the border), the travel limited, and the slope of the potential along it.
+    /// The Newton step (free unknowns, the border, and the change of the multiplier where there is one), the travel limited, and the slope of the potential along it.
     fn step(
         &self,
         drive: Drive,
@@ -316,8 +329,17 @@ impl System<'_> {
             columns.extend((0..free).map(|i| (0..3).map(|k| border[k * free + i] * direction[k]).sum::<f64>()));
         }
         let couplings = columns[free..].to_vec();
+        columns.extend_from_slice(&workspace.held.slope);
         let coupling = |direction: usize| &couplings[direction * free..(direction + 1) * free];
         workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut columns)?;
+        let mut changes = Vec::new();
+        if !workspace.held.slope.is_empty() {
+            let (bent, response) = columns.split_at_mut((1 + directions.len()) * free);
+            let border = Border::new(&workspace.held, response);
+            let missing = workspace.held.missing;
+            let columns = bent.chunks_exact_mut(free).enumerate();
+            changes.extend(columns.map(|(index, column)| border.bend(column, if index == 0 { missing } else { 0.0 })));
+        }
         let (alone, responses) = columns.split_at(free);
         let response = |direction: usize| &responses[direction * free..(direction + 1) * free];
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
@@ -337,10 +359,15 @@ impl System<'_> {
         for (direction, travel) in travels.iter().enumerate() {
             step.iter_mut().zip(response(direction)).for_each(|(s, r)| *s -= travel * r);
         }
-        let slope =
+        let mut slope =
             step.iter().zip(&residual[..free]).map(|(s, r)| s * r).sum::<f64>() + dot(&travels, &out_of_balance);
         let moved: Vector3<f64> = directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
         step.extend(moved.iter());
+        if let [alone, with_travel @ ..] = &changes[..] {
+            let change = alone - dot(&travels, with_travel);
+            slope -= change * workspace.held.missing;
+            step.push(change);
+        }
         Ok((step, slope.min(0.0)))
     }
 

@@ -32,7 +32,9 @@ fn wire_field(field: &str) -> String {
         return format!("scene.pose.position_mm{index}");
     }
     match field.split(['.', '[']).next() {
-        Some("surface" | "tissue" | "friction_coefficient" | "pressure_kpa" | "rest_pressure_kpa" | "puncture") => {
+        Some(
+            "surface" | "tissue" | "friction_coefficient" | "pressure_kpa" | "rest_pressure_kpa" | "puncture" | "bleb",
+        ) => {
             format!("scene.{field}")
         }
         Some("scene_from_patch") => "scene.pose.orientation_xyzw".to_owned(),
@@ -57,6 +59,20 @@ pub fn from_predict(error: PredictError) -> Problem {
             "needle.tip_mm",
             Some(json!([x_mm, y_mm])),
             format!("contact within {limit_mm} mm of the patch's centre in x and y"),
+            detail,
+        ),
+        PredictError::BlebOutsidePatch { x_mm, y_mm, limit_mm } => Problem::field(
+            Kind::OutsidePatch,
+            "scene.bleb.center_mm",
+            Some(json!([x_mm, y_mm])),
+            format!("a middle within {limit_mm} mm of the patch's centre in x and y"),
+            detail,
+        ),
+        PredictError::BesideBleb { away_mm, most_mm, core_mm, .. } => Problem::field(
+            Kind::NotPossible,
+            "needle.tip_mm",
+            Some(json!(away_mm)),
+            format!("a contact within {:.3} mm of the middle of the bleb", (most_mm - core_mm).max(0.0)),
             detail,
         ),
         PredictError::BeyondPuncture { force_mn, pressure_kpa, limit_kpa, .. } => Problem::field(
@@ -105,9 +121,10 @@ pub fn from_predict(error: PredictError) -> Problem {
         PredictError::Solver { cause: NewtonError::Interrupted { .. }, .. } => {
             Problem::new(Kind::TookTooLong, "The work was stopped at the time limit of the server.")
         }
-        PredictError::Solver { .. } | PredictError::Friction { .. } | PredictError::Linear(_) => {
-            Problem::new(Kind::NoEquilibrium, detail)
-        }
+        PredictError::Solver { .. }
+        | PredictError::Friction { .. }
+        | PredictError::Bleb { .. }
+        | PredictError::Linear(_) => Problem::new(Kind::NoEquilibrium, detail),
     }
 }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+use retina_core::scene::bleb::{self, Filling, SubretinalFluid};
 use retina_core::scene::conditions::{EYE_PRESSURE, FRICTION_COEFFICIENT};
 use retina_core::scene::puncture::{Puncture, PunctureForce};
 use retina_core::scene::{Scene, SceneSurface};
@@ -17,7 +18,7 @@ use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::{Triangle, Vector};
 use crate::wire::request::SceneChoice;
 use crate::wire::scene::{
-    BondSpec, LayerSpec, PoseSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind,
+    BlebSpec, BondSpec, LayerSpec, PoseSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind,
     SurfaceSpec, TissueSpec,
 };
 
@@ -80,7 +81,10 @@ fn on_surface(spec: &SceneSpec, surface: SceneSurface) -> Result<Scene, Problem>
         pressure_kpa: spec.pressure_kpa.unwrap_or(EYE_PRESSURE.default),
         rest_pressure_kpa: spec.rest_pressure_kpa.unwrap_or(EYE_PRESSURE.default),
         puncture: puncture(&spec.puncture.unwrap_or_default())?,
+        bleb: None,
     };
+    let bleb = spec.bleb.map(|spec| bleb(&spec, &scene.scene_from_patch)).transpose()?;
+    let scene = Scene { bleb, ..scene };
     scene.validate().map_err(|error| from_out_of_range(field(&error.field, spec), &error))?;
     Ok(scene)
 }
@@ -209,6 +213,26 @@ fn bond(spec: &BondSpec) -> RetinalBond {
         strength_kpa: spec.strength_kpa.unwrap_or(default.strength_kpa),
         fracture_energy_mn_per_mm: spec.fracture_energy_mn_per_mm.unwrap_or(default.fracture_energy_mn_per_mm),
     }
+}
+
+fn bleb(spec: &BlebSpec, scene_from_patch: &Isometry3<f64>) -> Result<SubretinalFluid, Problem> {
+    let center = spec.center_mm.map(|center| Point3::from(center.0));
+    let filling = match (spec.volume_mm3, spec.pressure_kpa) {
+        (Some(_), Some(_)) => return Err(both("scene.bleb.pressure_kpa", "scene.bleb.volume_mm3")),
+        (Some(volume_mm3), None) => Filling::Volume(volume_mm3),
+        (None, Some(pressure_kpa)) => Filling::Pressure(pressure_kpa),
+        (None, None) => {
+            let field = "scene.bleb.volume_mm3";
+            let allowed = format!("{} to {} mm³, or scene.bleb.pressure_kpa", bleb::VOLUME.min, bleb::VOLUME.max);
+            let detail = format!("{field} or scene.bleb.pressure_kpa must be given");
+            return Err(Problem::field(Kind::InvalidRequest, field, None, allowed, detail));
+        }
+    };
+    Ok(SubretinalFluid {
+        filling,
+        center_mm: center.unwrap_or_else(|| scene_from_patch * Point3::origin()),
+        radius_mm: spec.radius_mm.unwrap_or(bleb::RADIUS.default),
+    })
 }
 
 fn puncture(spec: &PunctureSpec) -> Result<Puncture, Problem> {

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use nalgebra::{Point3, Vector3};
 use retina_core::predict::{ContactReport, ContactState, EffectReport, NeedleOutcome, Prediction, SolverReport};
+use retina_core::scene::conditions::MMHG_KPA;
 use serde::ser::{SerializeMap, SerializeSeq};
 use serde::{Serialize, Serializer};
 use utoipa::ToSchema;
@@ -87,8 +88,22 @@ pub struct ContactAnswer {
     /// Largest share of the strength that the retina's bond has lost anywhere, 0 intact to 1 parted; told where `adhesion` is simulated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bond_damage: Option<f64>,
+    /// Fluid under the retina; told where `bleb` is simulated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bleb: Option<BlebAnswer>,
     /// Force under the needle and strain over the limits of `scene.puncture`, the larger of the two: above 1 the tissue counts as punctured.
     pub puncture_share: f64,
+}
+
+/// Fluid under the retina at equilibrium.
+#[derive(Serialize, ToSchema)]
+pub struct BlebAnswer {
+    /// Its pressure above that in the eye, kPa.
+    pub pressure_kpa: f64,
+    /// The same in mmHg.
+    pub pressure_mmhg: f64,
+    /// Its volume, mm³ (the same number in µl).
+    pub volume_mm3: f64,
 }
 
 /// Whether needle and retina touch.
@@ -230,6 +245,11 @@ impl From<&ContactReport> for ContactAnswer {
             max_penetration_um: contact.max_penetration_mm * 1e3,
             slipping_share: contact.slipping_share,
             bond_damage: contact.bond_damage,
+            bleb: contact.bleb.map(|bleb| BlebAnswer {
+                pressure_kpa: bleb.pressure_kpa,
+                pressure_mmhg: bleb.pressure_kpa / MMHG_KPA,
+                volume_mm3: bleb.volume_mm3,
+            }),
             puncture_share: contact.puncture_share,
         }
     }

@@ -34,6 +34,27 @@ pub struct SceneSpec {
     /// Where the tissue punctures; the limits of the tissue model when left out.
     #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub puncture: Option<PunctureSpec>,
+    /// Fluid between retina and choroid; none when left out. Levels `coarse` and `reference`, and no sequence, have it.
+    #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
+    pub bleb: Option<BlebSpec>,
+}
+
+/// Fluid between retina and choroid, where the retina is detached. Displacements are those from the surface without it.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BlebSpec {
+    /// Volume, mm³ (the same number in µl), 0 to 0.5; the pressure is then part of the answer. It or `pressure_kpa` must be given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume_mm3: Option<f64>,
+    /// Pressure above that in the eye, kPa, 0 to 8; the volume is then part of the answer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pressure_kpa: Option<f64>,
+    /// Centre of the detached disc, scene frame, mm; that of the patch when left out. Its depth does not matter.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub center_mm: Option<Vector>,
+    /// Radius of the detached disc, mm, 0.2 to 1; 0.5 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_mm: Option<f64>,
 }
 
 /// Where the tissue punctures: an answer beyond a limit says so, by its contact's state. A number left out is the default.

@@ -7,12 +7,13 @@ use std::time::Instant;
 
 use nalgebra::{Point3, Unit, Vector3};
 use retina_core::comparison::{node_errors_um, quantile};
-use retina_core::effects::{adhesion, contact, elasticity, finite_strain, friction, pressure, tool_flex};
+use retina_core::effects::{adhesion, bleb, contact, elasticity, finite_strain, friction, pressure, tool_flex};
 use retina_core::needle::shaft::STIFFNESS;
 use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::{Control, EffectChoice, Level, PredictError, Prediction, PreparedScene, Request, Workspace};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
+use retina_core::scene::bleb::{Filling, SubretinalFluid};
 
 /// Timed repeats of each prediction unless told.
 const REPEATS: usize = 30;
@@ -29,7 +30,7 @@ struct Case {
     without: &'static [&'static str],
 }
 
-const CASES: [Case; 5] = [
+const CASES: [Case; 6] = [
     Case {
         effect: finite_strain::NAME,
         what: "the default scene",
@@ -52,6 +53,15 @@ const CASES: [Case; 5] = [
         effect: adhesion::NAME,
         what: "a bond of 1 kPa",
         change: |scene| scene.tissue.bond.strength_kpa = 1.0,
+        without: &[finite_strain::NAME, contact::NAME],
+    },
+    Case {
+        effect: bleb::NAME,
+        what: "0.02 mm³ (20 nl) under 0.6 mm radius",
+        change: |scene| {
+            let (filling, center_mm, radius_mm) = (Filling::Volume(0.02), Point3::origin(), 0.6);
+            scene.bleb = Some(SubretinalFluid { filling, center_mm, radius_mm });
+        },
         without: &[finite_strain::NAME, contact::NAME],
     },
     Case {

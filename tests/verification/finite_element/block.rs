@@ -48,7 +48,7 @@ pub fn block(cells: [usize; 3], map: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<Eleme
 /// The elements of a slab −thickness ≤ z ≤ 0 over a disc with rings of these radii.
 pub fn slab(core_cells: usize, radii: &[f64], levels_mm: &[f64]) -> Vec<ElementNodes> {
     let topology = DiscTopology { core_cells, rings: radii.len() - 1 };
-    let places = topology.positions(&DiscGeometry { center: [0.0; 2], radii: radii.to_vec() });
+    let places = topology.positions(&DiscGeometry { center: [0.0; 2], radii: radii.to_vec(), offsets: Vec::new() });
     let mut elements = Vec::new();
     for cell in topology.cells() {
         for level in levels_mm.windows(2) {

@@ -50,7 +50,7 @@ impl Press {
         Press {
             topology: WallTopology::new(division).expect("a topology"),
             tissue: sheets.0,
-            disc: DiscGeometry { center: [0.0; 2], radii: radii.to_vec() },
+            disc: DiscGeometry { center: [0.0; 2], radii: radii.to_vec(), offsets: Vec::new() },
             shape: NeedleShape::hemispherical(radius_mm),
             solid,
             contact: ContactSettings {

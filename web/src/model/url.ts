@@ -29,7 +29,9 @@ export function toHash(settings: Settings): string {
   const [[kind, value]] = Object.entries(settings.accuracy) as [[string, string | number]];
   const short = Object.entries(ACCURACY).find(([, long]) => long === kind)?.[0] ?? "level";
   put(short, String(value), "level" in INITIAL.accuracy ? INITIAL.accuracy.level : "");
-  if (settings.effects !== "auto") words.set("effects", settings.effects.join(" "));
+  const { effects } = settings;
+  if (effects !== "auto")
+    words.set("effects", typeof effects === "string" ? effects : effects.join(" "));
   put("colour", settings.quantity, INITIAL.quantity);
   for (const layer of LAYERS) {
     put(layer, settings.layers[layer] ? "1" : "0", INITIAL.layers[layer] ? "1" : "0");
@@ -57,7 +59,9 @@ export function fromHash(hash: string): Settings {
   settings.along = oneOf("along", ["needle", "inward"], INITIAL.along);
   settings.accuracy = accuracy(words.get("level"), number("error"), number("time"));
   const effects = words.get("effects");
-  settings.effects = effects === null ? "auto" : effects.split(" ").filter((name) => name !== "");
+  if (effects === "all") settings.effects = effects;
+  else
+    settings.effects = effects === null ? "auto" : effects.split(" ").filter((name) => name !== "");
   settings.quantity = oneOf("colour", QUANTITIES, INITIAL.quantity);
   const layers = LAYERS.map((layer) => {
     const shown = oneOf(layer, ["0", "1"], INITIAL.layers[layer] ? "1" : "0") === "1";

@@ -5,7 +5,7 @@ export type Quaternion = [number, number, number, number];
 export type Triangle = [number, number, number];
 export type TipName = "hemispherical" | "flat" | "bevelled";
 export type Accuracy = { level: string } | { max_error_um: number } | { max_time_ms: number };
-export type Effects = "auto" | string[];
+export type Effects = "auto" | "all" | string[];
 
 export type TipSpec =
   | "hemispherical"
@@ -44,7 +44,14 @@ export interface EffectAnswer {
 export interface PredictResponse {
   surface: Surface;
   needle: { tip_mm: Vector; travel_mm: number; reaction_mn: Vector };
-  contact: { state: string; area_mm2: number; max_strain: number; max_pressure_kpa: number };
+  contact: {
+    state: string;
+    area_mm2: number;
+    max_strain: number;
+    max_pressure_kpa: number;
+    /** Fluid under the retina, where it is simulated. */
+    bleb?: { pressure_kpa: number; pressure_mmhg: number; volume_mm3: number };
+  };
   accuracy: {
     level: string;
     expected_error_um?: { median?: number; p95?: number };

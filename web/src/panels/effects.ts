@@ -1,9 +1,11 @@
-/** Panel: which effects were simulated and why; a switch for each. */
+/** Panel: which effects were simulated and why; all of them by rule, or a switch for each; what the scene has that calls for them. */
 
 import { figures } from "../colour/scale";
 import type { EffectAnswer } from "../model/wire";
 import type { Page } from "../page";
+import { Choice } from "./choice";
 import type { Complainer } from "./complaints";
+import { conditions } from "./conditions";
 import { checkbox, element, panel, setText } from "./dom";
 import { perFrame } from "../per_frame";
 
@@ -12,14 +14,23 @@ interface Row {
   tell: (effect: EffectAnswer, wanted: boolean) => void;
 }
 
-export function effectsPanel({ settings, session, complaints }: Page): void {
+type Rule = "auto" | "all" | "chosen";
+
+const RULES: readonly { value: Rule; text: string; hint: string }[] = [
+  { value: "auto", text: "automatic", hint: "The server decides from scene and accuracy" },
+  { value: "all", text: "all", hint: "Whatever the level can simulate" },
+  { value: "chosen", text: "chosen", hint: "Those that are switched on below" },
+];
+
+export function effectsPanel(page: Page): void {
+  const { settings, session, complaints } = page;
   const body = panel("effects");
   const simulated = (): string[] => {
     const effects = session.get().shown?.answer.effects ?? [];
     return effects.filter((effect) => effect.simulated).map(({ name }) => name);
   };
-  const automatic = checkbox("chosen by the server, from scene and accuracy", (on) =>
-    settings.patch({ effects: on ? "auto" : simulated() }),
+  const rule = new Choice<Rule>("Simulate", RULES, (rule) =>
+    settings.patch({ effects: rule === "chosen" ? simulated() : rule }),
   );
   const list = element("ul", { class: "effects" });
   const complaint = element("p", { class: "complaint", hidden: true });
@@ -31,17 +42,17 @@ export function effectsPanel({ settings, session, complaints }: Page): void {
   };
   complaints.register(complainer, "effects");
   const warnings = element("p", { class: "note" });
-  body.append(automatic.root, list, complaint, warnings);
+  body.append(conditions(page), rule.root, list, complaint, warnings);
 
   const turn = (name: string, on: boolean): void => {
     const now = settings.get().effects;
-    const others = (now === "auto" ? simulated() : now).filter((other) => other !== name);
+    const others = (typeof now === "string" ? simulated() : now).filter((other) => other !== name);
     settings.patch({ effects: on ? [...others, name] : others });
   };
   const rows = new Map<string, Row>();
   const show = perFrame(() => {
     const { effects: wanted } = settings.get();
-    automatic.set(wanted === "auto");
+    rule.set(typeof wanted === "string" ? wanted : "chosen");
     const answer = session.get().shown?.answer;
     for (const effect of answer?.effects ?? []) {
       let row = rows.get(effect.name);
@@ -50,7 +61,10 @@ export function effectsPanel({ settings, session, complaints }: Page): void {
         rows.set(effect.name, row);
         list.append(row.root);
       }
-      row.tell(effect, wanted === "auto" ? effect.simulated : wanted.includes(effect.name));
+      row.tell(
+        effect,
+        typeof wanted === "string" ? effect.simulated : wanted.includes(effect.name),
+      );
     }
     setText(warnings, answer?.warnings.join(" ") ?? "");
   });

@@ -4,6 +4,7 @@ import { numberAt } from "../model/paths";
 import type { Parameter, SceneSpec } from "../model/wire";
 import type { Page } from "../page";
 import { Choice } from "./choice";
+import { isCondition } from "./conditions";
 import { button, checkbox, element, panel } from "./dom";
 import { perFrame } from "../per_frame";
 import { NumberControl } from "./number_control";
@@ -44,6 +45,7 @@ export function tissuePanel(page: Page): void {
     const listed = catalog.scenes.parameters.filter(
       ({ field }) =>
         !field.startsWith(OF_TIME) &&
+        !isCondition(field) &&
         (numberAt(spec, field) !== undefined || (hasMembrane && field.startsWith(MEMBRANE))),
     );
     const wanted = [now.scene, ...listed.map(({ field }) => field)].join(" ");

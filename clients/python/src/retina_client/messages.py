@@ -174,6 +174,31 @@ class BevelledTip(TypedDict, total=False):
     """Radius of the rounded edge, mm; a tenth of the needle's radius when left out."""
 
 
+class BlebAnswer(TypedDict):
+    """Fluid under the retina at equilibrium."""
+    pressure_kpa: float
+    """Its pressure above that in the eye, kPa."""
+    pressure_mmhg: float
+    """The same in mmHg."""
+    volume_mm3: float
+    """Its volume, mm³ (the same number in µl)."""
+
+
+class BlebSpec(TypedDict, total=False):
+    """Fluid between retina and choroid, where the retina is detached. Displacements are those from the surface
+    without it.
+    """
+    center_mm: Optional["Vector"]
+    pressure_kpa: Optional[float]
+    """Pressure above that in the eye, kPa, 0 to 8; the volume is then part of the answer."""
+    radius_mm: Optional[float]
+    """Radius of the detached disc, mm, 0.2 to 1; 0.5 when left out."""
+    volume_mm3: Optional[float]
+    """Volume, mm³ (the same number in µl), 0 to 0.5; the pressure is then part of the answer. It or `pressure_kpa`
+    must be given.
+    """
+
+
 class BondSpec(TypedDict, total=False):
     """How the retina holds on to the pigment epithelium under it; a number left out is the default."""
     fracture_energy_mn_per_mm: Optional[float]
@@ -201,6 +226,7 @@ class _ContactAnswerRequired(TypedDict):
 
 class ContactAnswer(_ContactAnswerRequired, total=False):
     """The contact at equilibrium."""
+    bleb: Optional["BlebAnswer"]
     bond_damage: Optional[float]
     """Largest share of the strength that the retina's bond has lost anywhere, 0 intact to 1 parted; told where
     `adhesion` is simulated.
@@ -685,6 +711,7 @@ class SceneProgress(TypedDict):
 
 class SceneSpec(TypedDict, total=False):
     """A scene written out."""
+    bleb: Optional["BlebSpec"]
     friction_coefficient: Optional[float]
     """Coulomb's coefficient of friction between needle and retina, 0 to 2; 0 when left out."""
     pose: Optional["PoseSpec"]

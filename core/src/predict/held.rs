@@ -1,0 +1,80 @@
+//! What holds the retina on the choroid, and the fluid between them: the pieces of a solve that has an interface.
+
+use super::finite_element::Problem;
+use super::types::BlebReport;
+use crate::effect::Local;
+use crate::effects::adhesion::{Adhesion, Bond, Interface, STIFFNESS_KPA_PER_MM};
+use crate::effects::bleb::Fluid;
+use crate::equilibrium::Wall;
+
+/// Strength of a bond that is not simulated to part (kPa): the retina holds outside of a bleb.
+const UNBREAKABLE_KPA: f64 = 1e6;
+
+/// The interface of one solve.
+pub(super) struct Held {
+    interface: Interface,
+    bond: Bond,
+    /// Largest openings of the past: none, or beyond parting inside of a bleb (mm).
+    largest_mm: Vec<f64>,
+    /// Whether each face is inside of the bleb.
+    detached: Vec<bool>,
+}
+
+impl Held {
+    /// What holds the retina of `problem` on `wall`; `None` where it cannot part.
+    pub fn new(problem: &Problem, wall: &Wall) -> Option<Self> {
+        if problem.bond.is_none() && problem.bleb.is_none() {
+            return None;
+        }
+        let stencils = &wall.topology().interface;
+        let interface = Interface::new(stencils, &wall.geometry.rest);
+        let (strength_kpa, fracture_energy_mn_per_mm) = match problem.bond {
+            Some(bond) => (bond.strength_kpa, bond.fracture_energy_mn_per_mm),
+            // Twice what it takes to open such a bond to its strength, so that the law stays a law.
+            None => (UNBREAKABLE_KPA, UNBREAKABLE_KPA * UNBREAKABLE_KPA / STIFFNESS_KPA_PER_MM),
+        };
+        let bond = Bond { strength_kpa, fracture_energy_mn_per_mm, stiffness_kpa_per_mm: STIFFNESS_KPA_PER_MM };
+        let detached = match &problem.bleb {
+            Some(bleb) => wall.detached(bleb),
+            None => vec![false; stencils.len()],
+        };
+        let largest =
+            |&apart: &bool| std::iter::repeat_n(if apart { 2.0 * bond.parted_mm() } else { 0.0 }, interface.points());
+        let largest_mm = detached.iter().flat_map(largest).collect();
+        Some(Held { interface, bond, largest_mm, detached })
+    }
+
+    /// The bond.
+    pub fn adhesion(&self) -> Adhesion<'_> {
+        Adhesion { interface: &self.interface, bond: self.bond, largest_mm: &self.largest_mm }
+    }
+
+    /// The fluid of `problem`, if it has any.
+    pub fn fluid(&self, problem: &Problem) -> Option<Fluid<'_>> {
+        let holds = problem.bleb?.holds(problem.pressure_kpa.unwrap_or_default());
+        Some(Fluid { detached: &self.detached, holds })
+    }
+
+    /// The largest damage of the bond at `positions`, outside of a bleb.
+    pub fn damage(&self, wall: &Wall, positions: &[f64]) -> f64 {
+        let stencils = &wall.topology().interface;
+        let (adhesion, mut current) = (self.adhesion(), vec![0.0; 3 * stencils.group_size]);
+        let mut largest: f64 = 0.0;
+        for group in (0..stencils.len()).filter(|&group| !self.detached[group]) {
+            stencils.gather(group, positions, &mut current);
+            let local = Local { current: &current, group, predicted: &[] };
+            largest = adhesion.openings(&local).fold(largest, f64::max);
+        }
+        self.bond.damage(largest)
+    }
+}
+
+impl Problem<'_> {
+    /// What the answer tells of the fluid at `positions`: its pressure counts from that in the eye.
+    pub(super) fn told_of(&self, fluid: &Fluid, wall: &Wall, positions: &[f64]) -> BlebReport {
+        BlebReport {
+            pressure_kpa: fluid.pressure_kpa() - self.pressure_kpa.unwrap_or_default(),
+            volume_mm3: wall.fluid_volume_mm3(fluid, positions),
+        }
+    }
+}
