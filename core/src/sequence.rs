@@ -15,6 +15,7 @@
 //! remember), `advance` (one step). Not here: clocks, threads, the wire.
 
 mod advance;
+mod bond;
 mod history;
 mod plan;
 mod rates;
@@ -201,13 +202,13 @@ impl<'a> Simulation<'a> {
         let body = sequence.needle.shape.body();
         let (patch, plan) = plan::plan(prepared, sequence, &body, progress)?;
         let first = |cause| SequenceError::At { step: 0, time_s: sequence.steps[0].time_s, cause };
-        let (decision, rates) = rates::decide(prepared, sequence, &plan).map_err(first)?;
+        let (decision, rates) = rates::decide(prepared, sequence, &plan);
         let resolution = resolution.unwrap_or(match sequence.level {
             Level::Reference => &REFERENCE,
-            _ if rates.any() => &LASTING,
+            _ if rates.any() || (decision.is_path_dependent() && !plan.is_one_contact()) => &LASTING,
             _ => &COARSE,
         });
-        let topology = shared_topology(resolution.division(&prepared.scene().tissue, false))
+        let topology = shared_topology(resolution.division(&prepared.scene().tissue, decision.adhesion))
             .map_err(|error| first(PredictError::Mesh(error)))?;
         let solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
         Ok(Simulation {
@@ -235,6 +236,11 @@ impl<'a> Simulation<'a> {
     /// Every effect, simulated or not, and why; the same for all steps.
     pub fn effects(&self) -> &[EffectReport] {
         &self.decision.reports
+    }
+
+    /// Whether a step depends on those before it: its mesh then lasts.
+    fn remembers(&self) -> bool {
+        self.rates.any() || self.decision.is_path_dependent()
     }
 
     /// Triangles between the nodes of every step's surface, counter-clockwise seen from the vitreous.

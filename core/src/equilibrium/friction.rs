@@ -4,15 +4,16 @@
 //! force along the motion is shared between pressure and friction, each round answers the last one's error with one of the opposite sign, and plain repetition
 //! would diverge beyond µ tan(angle) = 1. The friction itself begins with a coefficient that rises and a wide stick zone that narrows from round to round, so that no solve has to find many points' way
 //! across it at once. A round begins with the stiffness that the one before left, factorised, and ends as near to equilibrium as the pressures are to rest.
-//! Not here: the energy (`effects::friction`).
+//! Not here: the energy (`effects::friction`), what is remembered of earlier motions (`grip`).
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::attempts::REPETITIONS;
+use super::grip::{Approach, Grip};
 use super::{Addition, Equilibrium, Load, Wall};
 use crate::effect::{Effect, Local};
-use crate::effects::friction::{Friction, RubbingPoint, anchor};
+use crate::effects::friction::{Friction, RubbingPoint};
 use crate::mesh::wall::Place;
 use crate::progress::Progress;
 use crate::solve::newton::{NewtonError, NewtonReport, Workspace};
@@ -105,8 +106,27 @@ impl Wall<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<(Equilibrium, Rubbing), FrictionError> {
+        let found = self.solve_gripped(load, coefficient, &Grip::default(), positions, workspace, progress);
+        found.map(|(equilibrium, rubbing, _)| (equilibrium, rubbing))
+    }
+
+    /// As [`Wall::solve_with_friction`], after motions that left the needle with `grip`; the grip that this one leaves.
+    ///
+    /// # Errors
+    /// [`FrictionError`].
+    pub fn solve_gripped(
+        &self,
+        load: &Load,
+        coefficient: f64,
+        grip: &Grip,
+        positions: Vec<f64>,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<(Equilibrium, Rubbing, Grip), FrictionError> {
         let mut found = self.solve(load, positions, workspace, progress)?;
         let mut total = found.newton;
+        let tip = Vector3::from_row_slice(&found.positions[3 * self.topology.needle()..]);
+        let approach = self.approach(load, grip, &tip);
         let mut pressed = self.pressed(&found.positions);
         let (mut last_error, mut mix) = (Vec::new(), MIX.1);
         let mut widening = FIRST_WIDENING;
@@ -115,7 +135,7 @@ impl Wall<'_> {
         for round in 1..=MAX_ROUNDS {
             let reached = coefficient.min(round as f64 * COEFFICIENT_STEP);
             let settling = reached == coefficient && widening == 1.0;
-            let points = self.rubbing_points(load, reached, &pressed);
+            let points = self.rubbing_points(&approach, reached, &pressed);
             let friction = Friction { faces: &self.faces, points: &points, full_slip_mm: FULL_SLIP_MM * widening };
             let rubs = [Addition { effect: &friction, place: Place::Faces }];
             let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
@@ -131,7 +151,8 @@ impl Wall<'_> {
             }
             if settling && change <= SETTLED {
                 let rubbing = self.rubbing(&friction, &found.positions, round);
-                return Ok((Equilibrium { newton: total, ..found }, rubbing));
+                let left = self.grip(&friction, &found.positions);
+                return Ok((Equilibrium { newton: total, ..found }, rubbing, left));
             }
             let error: Vec<f64> = now.forces_mn.iter().zip(&pressed.forces_mn).map(|(new, used)| new - used).collect();
             if settling && last_error.len() == error.len() {
@@ -217,33 +238,21 @@ impl Wall<'_> {
     }
 
     /// The points that rub, face by face, with their anchors.
-    fn rubbing_points(&self, load: &Load, coefficient: f64, pressed: &Pressed) -> Vec<Vec<RubbingPoint>> {
-        let stencils = &self.topology.faces;
-        let pose = &self.tool.patch_from_needle;
-        let direction = pose.inverse_transform_unit_vector(&load.motion.direction);
-        let start = self.start();
+    fn rubbing_points(&self, approach: &Approach, coefficient: f64, pressed: &Pressed) -> Vec<Vec<RubbingPoint>> {
         let face = |group: usize| -> Vec<RubbingPoint> {
-            let vertices = stencils.group(group);
-            let rest = |point: usize| -> Point3<f64> {
-                let node = |vertex: u32| Vector3::from_row_slice(&start[3 * vertex as usize..][..3]);
-                Point3::from(
-                    self.faces.values(point).iter().zip(vertices).map(|(v, &n)| node(n) * *v).sum::<Vector3<f64>>(),
-                )
-            };
             let rubs = |&point: &usize| pressed.normals[group * self.faces.points + point] != Vector3::zeros();
             let rubbing = |point: usize| {
                 let at = group * self.faces.points + point;
-                let anchor = anchor(self.tool.body, &pose.inverse_transform_point(&rest(point)), &direction);
                 RubbingPoint {
                     point,
                     limit_mn: coefficient * pressed.forces_mn[at],
                     normal: pressed.normals[at],
-                    anchor: pose.rotation * anchor.coords,
+                    anchor: approach.anchor(self, group, point),
                 }
             };
             (0..self.faces.points).filter(rubs).map(rubbing).collect()
         };
-        (0..stencils.len()).map(face).collect()
+        (0..self.topology.faces.len()).map(face).collect()
     }
 
     /// What slips, and with what force.

@@ -38,6 +38,13 @@ pub struct Decision {
     pub reports: Vec<EffectReport>,
 }
 
+impl Decision {
+    /// Whether where the tissue ends up depends on the way there, however slowly it is gone.
+    pub fn is_path_dependent(&self) -> bool {
+        self.friction || self.adhesion
+    }
+}
+
 /// What the linear answer predicts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {

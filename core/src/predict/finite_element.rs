@@ -6,7 +6,7 @@ use super::types::{ContactReport, ContactState, PredictError, SolverReport};
 use crate::effect::Local;
 use crate::effects::adhesion::{Adhesion, Bond, Interface, STIFFNESS_KPA_PER_MM};
 use crate::effects::pressure::Pressure;
-use crate::equilibrium::friction::FrictionError;
+use crate::equilibrium::friction::{FrictionError, Rubbing};
 use crate::equilibrium::settled::Settled;
 use crate::equilibrium::{
     Addition, ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Strains, Tool, Wall,
@@ -226,11 +226,7 @@ impl Problem<'_> {
             vec![0.0; interface.as_ref().map_or(0, |(_, interface)| interface.points()) * topology.interface.len()];
         let adhesion = interface.as_ref().map(|(bond, interface)| Adhesion {
             interface,
-            bond: Bond {
-                strength_kpa: bond.strength_kpa,
-                fracture_energy_mn_per_mm: bond.fracture_energy_mn_per_mm,
-                stiffness_kpa_per_mm: STIFFNESS_KPA_PER_MM,
-            },
+            bond: simulated_bond(bond),
             largest_mm: &intact,
         });
         let mut additions: Vec<Addition> =
@@ -252,11 +248,8 @@ impl Problem<'_> {
         };
         progress.stage("surface");
         let mut answer = self.answer(&wall, resolution, &equilibrium, touch_mm);
-        if let Some(rubbing) = rubbing.filter(|_| answer.contact.state == ContactState::Touching) {
-            answer.contact.slipping_share = Some(rubbing.slipping_share);
-            if rubbing.slipping_share > SLIPPING_FROM {
-                answer.contact.state = ContactState::Slipping;
-            }
+        if let Some(rubbing) = &rubbing {
+            answer.contact.rub(rubbing);
         }
         answer.contact.bond_damage = adhesion.map(|adhesion| damage(&adhesion, topology, &equilibrium.positions));
         Ok(answer)
@@ -369,8 +362,29 @@ impl Problem<'_> {
     }
 }
 
+impl ContactReport {
+    /// Says how a contact rubs.
+    pub(crate) fn rub(&mut self, rubbing: &Rubbing) {
+        if self.state == ContactState::Touching {
+            self.slipping_share = Some(rubbing.slipping_share);
+            if rubbing.slipping_share > SLIPPING_FROM {
+                self.state = ContactState::Slipping;
+            }
+        }
+    }
+}
+
+/// The bond of the tissue as it is simulated.
+pub(crate) fn simulated_bond(bond: &RetinalBond) -> Bond {
+    Bond {
+        strength_kpa: bond.strength_kpa,
+        fracture_energy_mn_per_mm: bond.fracture_energy_mn_per_mm,
+        stiffness_kpa_per_mm: STIFFNESS_KPA_PER_MM,
+    }
+}
+
 /// The largest damage of the bond at `positions`.
-fn damage(adhesion: &Adhesion, topology: &WallTopology, positions: &[f64]) -> f64 {
+pub(crate) fn damage(adhesion: &Adhesion, topology: &WallTopology, positions: &[f64]) -> f64 {
     let mut current = vec![0.0; 3 * topology.interface.group_size];
     let mut largest: f64 = 0.0;
     for group in 0..topology.interface.len() {

@@ -71,7 +71,7 @@ pub(crate) struct Sink {
     /// The decision about the effect.
     pub(crate) report: EffectReport,
     /// Change of the pressure (kPa), where it is simulated.
-    pub(super) change_kpa: Option<f64>,
+    pub(crate) change_kpa: Option<f64>,
     /// Largest sinking of a node that is expected of it, in magnitude (mm); 0 where it is not simulated.
     pub(super) expected_mm: f64,
 }
@@ -143,7 +143,7 @@ impl Question<'_> {
         Sink { report, change_kpa: simulated.then_some(change_kpa), expected_mm }
     }
 
-    pub(super) fn decide(&self, expected: Expected, sink: &Sink) -> Result<Decision, PredictError> {
+    pub(crate) fn decide(&self, expected: Expected, sink: &Sink) -> Result<Decision, PredictError> {
         if let (Some(change_kpa), Some(settled)) = (sink.change_kpa, self.settled(sink.change_kpa, Solid::FiniteStrain))
             && settled.max_strain() > MAX_SETTLED_STRAIN
         {
@@ -170,7 +170,7 @@ impl Question<'_> {
     }
 
     /// The tool as it stands to the surface at rest: raised by what the surface under it has sunk.
-    pub(super) fn raised(&self, sink: &Sink) -> Tool<'_> {
+    pub(crate) fn raised(&self, sink: &Sink) -> Tool<'_> {
         let mut tool = self.tool;
         if sink.change_kpa.is_some() {
             // What `decide` will find unless the sinking itself is small.
