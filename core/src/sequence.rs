@@ -16,6 +16,7 @@
 
 mod advance;
 mod bond;
+mod cut;
 mod history;
 mod plan;
 mod rates;
@@ -165,6 +166,8 @@ pub struct Simulation<'a> {
     next: usize,
     time_s: f64,
     needle: Needle,
+    /// Force of the tissue on it at the end of the last part of a step, scene coordinates (mN).
+    reaction_mn: Vector3<f64>,
     laid: Option<Laid>,
     settled: Option<Settled>,
     history: Option<History>,
@@ -226,6 +229,7 @@ impl<'a> Simulation<'a> {
             next: 0,
             time_s: 0.0,
             needle: sequence.needle,
+            reaction_mn: Vector3::zeros(),
             laid: None,
             settled: None,
             history: None,
@@ -258,7 +262,6 @@ impl<'a> Simulation<'a> {
         let outcome = self.advance(step, progress);
         let (prediction, mesh_laid) = outcome.map_err(|cause| SequenceError::At { step: index, time_s, cause })?;
         self.next += 1;
-        self.time_s = time_s;
         Ok(Some(StepOutcome { step: index, time_s, mesh_laid, prediction }))
     }
 }

@@ -34,7 +34,7 @@ struct Aim {
 
 impl Simulation<'_> {
     /// The answer to `step`, and whether a mesh was laid for it.
-    pub(super) fn advance(
+    pub(super) fn advance_at_once(
         &mut self,
         step: &Step,
         progress: &mut dyn Progress,
