@@ -1,18 +1,19 @@
 //! A sequence: a timed list of needle poses and forces in, one surface after another out.
 //!
-//! Time runs from 0, when the tissue is at rest; the load of a step is reached at the step's time, linearly from the step before. Without an
-//! effect that remembers (`viscoelasticity`, `inertia`) every step is an equilibrium of its own, and the step before is only its
-//! start; with one, [`Simulation`] carries what is remembered from step to step.
+//! Time runs from 0, when the tissue is at rest under the pressure of its eye; the load of a step is reached at the step's time, linearly from the step before. Without
+//! memory every step is an equilibrium of its own, and the step before is only its start. Memory is of two kinds, and [`Simulation`] carries both from
+//! step to step: of time (`viscoelasticity`, `inertia`), and of the way, however slowly it is gone (`friction`: where the needle holds the tissue; `adhesion`:
+//! how far the bond was torn).
 //!
 //! Where the mesh stands: a mesh as coarse as `coarse` answers well only for the contact that it was made for (a contact of half the radius is off by a
 //! third of its motion). So without memory a step keeps the mesh, and starts from the step before, while its expected contact stays within
 //! two hundredths of a radius of the one that the mesh was laid around, as in a stream at haptic rate; else it gets a mesh of its own and a fresh linear
-//! start, and says so. Tissue once punctured stays so in every step that follows, which say since when. What tissue remembers lives in its elements: with memory one mesh lasts from first to last. It is laid around
-//! all expected contacts, level `coarse` divides it more finely ([`LASTING`]), and a step whose contact leaves its fine zone carries a
+//! start, and says so. Tissue once punctured stays so in every step that follows, which say since when. What tissue remembers lives in its elements and faces: with memory one mesh lasts from first to last. It is laid around
+//! all expected contacts, level `coarse` divides it more finely ([`LASTING`]) unless all of them are one and nothing depends on time, and a step whose contact leaves its fine zone carries a
 //! warning that says by how much.
 //!
-//! Read on in `plan` (every step checked before the first is computed), `rates` (which effects that remember are called for), `history` (what they
-//! remember), `advance` (one step). Not here: clocks, threads, the wire.
+//! Read on in `plan` (every step checked before the first is computed), `rates` (which effects of time are called for), `history` and `bond` (what is
+//! remembered), `advance` (one step), `cut` (a step in parts). Not here: clocks, threads, the wire.
 
 mod advance;
 mod bond;

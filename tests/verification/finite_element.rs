@@ -9,3 +9,4 @@ mod manufactured;
 mod peel;
 mod pressed_needle;
 mod pressed_slab;
+mod stick_slip;

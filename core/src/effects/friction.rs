@@ -116,11 +116,11 @@ impl Friction<'_> {
     /// itself at the distance [`AT_REST`] ε, where friction is short of its limit by one part in ten thousand, so that a needle that stops meets tissue that sticks.
     pub fn dragged(&self, local: &Local, rubbing: &RubbingPoint) -> Vector3<f64> {
         let slip = self.slip(local, rubbing);
-        let (y, kept) = (slip.norm(), AT_REST * self.full_slip_mm);
-        if y <= kept {
+        let y = slip.norm();
+        if y < self.full_slip_mm {
             return rubbing.anchor;
         }
-        rubbing.anchor + self.offset(local, rubbing) - slip * (kept / y)
+        rubbing.anchor + self.offset(local, rubbing) - slip * (AT_REST * self.full_slip_mm / y)
     }
 
     /// f₀, f₁(y)/y and f₁′ (mm, 1/mm, 1/mm) at the slip y (mm).

@@ -228,6 +228,7 @@ impl Problem<'_> {
             interface,
             bond: simulated_bond(bond),
             largest_mm: &intact,
+            opened: None,
         });
         let mut additions: Vec<Addition> =
             pressure.iter().map(|effect| Addition { effect, place: Place::Faces }).collect();

@@ -210,7 +210,7 @@ impl Simulation<'_> {
             let motion = Motion { direction: Vector3::z_axis(), force_mn: None, travel_mm: WITHDRAWN_MM };
             let mut start = wall.start();
             wall.place_tip(&mut start, &(motion.direction.into_inner() * WITHDRAWN_MM));
-            let bond = history.bond();
+            let bond = history.bond(f64::INFINITY);
             let mut additions = pressing.to_vec();
             additions.extend(bond.as_ref().map(|effect| Addition { effect, place: Place::Interface }));
             let load = Load { motion: &motion, touch_mm: WITHDRAWN_MM, additions: &additions };

@@ -12,7 +12,6 @@ use crate::equilibrium::grip::Grip;
 use crate::equilibrium::{Addition, Wall};
 use crate::mesh::wall::{Place, WallTopology};
 use crate::predict::choice::Decision;
-use crate::predict::finite_element::simulated_bond;
 use crate::tissue::{LayerKind, Tissue};
 
 /// The memory of every effect that is simulated.
@@ -41,7 +40,7 @@ impl History {
             momentum: rates.inertia.then(|| Momentum::at_rest(rest.to_vec())),
             density_kg_per_mm3: vec![tissue.rate.density_kg_per_mm3; topology.elements.len()],
             drag_kpa_s_per_mm: tissue.rate.vitreous_drag_kpa_s_per_mm,
-            bond: decision.adhesion.then(|| BondMemory::intact(simulated_bond(&tissue.bond), topology, rest)),
+            bond: decision.adhesion.then(|| BondMemory::intact(&tissue.bond, topology, rest)),
             grip: Grip::default(),
         }
     }
@@ -85,7 +84,7 @@ impl History {
             drag_kpa_s_per_mm: self.drag_kpa_s_per_mm,
             step_s,
         });
-        let adhesion = self.bond();
+        let adhesion = self.bond(step_s);
         let mut additions = others.to_vec();
         additions.extend(viscous.as_ref().map(|effect| Addition { effect, place: Place::Elements }));
         additions.extend(inertia.as_ref().map(|effect| Addition { effect, place: Place::Elements }));
@@ -108,9 +107,9 @@ impl History {
         self.grip = grip;
     }
 
-    /// The bond as the next step finds it, if it can part.
-    pub fn bond(&self) -> Option<Adhesion<'_>> {
-        self.bond.as_ref().map(BondMemory::effect)
+    /// The bond during a step of `step_s` (s), if it can part.
+    pub fn bond(&self, step_s: f64) -> Option<Adhesion<'_>> {
+        self.bond.as_ref().map(|bond| bond.effect(step_s))
     }
 
     /// Largest damage of the bond, if it can part.

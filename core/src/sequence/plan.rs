@@ -19,6 +19,10 @@ use crate::solve::newton::NewtonError;
 pub(super) struct Plan {
     /// The contact of each step; `None` where the needle does not press.
     pub contacts: Vec<Option<ContactEstimate>>,
+    /// What was expected for that, the worst of all steps.
+    pub expected: Expected,
+    /// Whether the needle is held in the tissue in some step: what it presses with is then the tissue's to say.
+    pub is_held: bool,
     /// What is decided of every effect but those of rate.
     pub decision: Decision,
     /// What the eye's pressure does by itself.
@@ -216,6 +220,7 @@ pub(super) fn plan<'a>(
     let mut worst = Worst { expected: first.unpressed(&sink), depth_mm: 0.0, along_mm: 0.0, before: None };
     let mut contacts = Vec::with_capacity(sequence.steps.len());
     let mut fastest_change_s = f64::INFINITY;
+    let mut is_held = false;
     let mut needle = sequence.needle;
     let (mut before_s, mut load_before) = (0.0, None);
     for (index, step) in sequence.steps.iter().enumerate() {
@@ -232,6 +237,7 @@ pub(super) fn plan<'a>(
             let direction = patch.patch().scene_from_patch * question.motion.direction.into_inner();
             needle.tip_mm += direction * linear.travel_mm();
         }
+        is_held |= step.force_mn.is_none() && linear.is_some();
         worst.meet(&question, linear.as_ref(), &sink);
         let load = linear.as_ref().map(|linear| (linear.depth_mm, linear.center));
         if load != load_before {
@@ -242,5 +248,5 @@ pub(super) fn plan<'a>(
     }
     let decision = first.decide(worst.expected, &sink).map_err(|cause| at(0, cause))?;
     drop(first);
-    Ok((patch, Plan { contacts, decision, sink, fastest_change_s }))
+    Ok((patch, Plan { contacts, expected: worst.expected, is_held, decision, sink, fastest_change_s }))
 }

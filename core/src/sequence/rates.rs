@@ -12,6 +12,7 @@ use super::plan::Plan;
 use crate::effects::viscoelasticity::Network;
 use crate::effects::{inertia, viscoelasticity};
 use crate::predict::choice::Decision;
+use crate::predict::choice::adhesion::{Pull, report as report_adhesion};
 use crate::predict::{EffectChoice, EffectReport, PreparedScene};
 use crate::tissue::{LayerKind, Tissue};
 
@@ -92,5 +93,14 @@ pub(super) fn decide(prepared: &PreparedScene, sequence: &Sequence, plan: &Plan)
         viscoelasticity: judge(viscoelasticity::NAME, borne, relaxation) && !networks.is_empty(),
         inertia: judge(inertia::NAME, overshoot, vibration),
     };
+    if rates.viscoelasticity && plan.is_held {
+        // A needle that is moved fast presses the stiffer tissue with more.
+        let pull = Pull { normal_force_mn: plan.expected.pull.normal_force_mn * (1.0 + borne), ..plan.expected.pull };
+        let report = report_adhesion(&sequence.effects, sequence.level, decision.contact, &pull);
+        decision.adhesion = report.simulated;
+        if let Some(place) = decision.reports.iter_mut().find(|place| place.name == report.name) {
+            *place = report;
+        }
+    }
     (decision, rates)
 }
