@@ -1,6 +1,6 @@
 //! The repetition that friction needs: solve, take new contact pressures and normals, solve again, until they settle.
 //!
-//! It starts from the frictionless equilibrium. The pressures of the next round are a mix of those used and those found (Irons & Tuck 1969): where the
+//! It starts from the frictionless equilibrium, or after another motion from the equilibrium under the pressures that this one left. The pressures of the next round are a mix of those used and those found (Irons & Tuck 1969): where the
 //! force along the motion is shared between pressure and friction, each round answers the last one's error with one of the opposite sign, and plain repetition
 //! would diverge beyond µ tan(angle) = 1. The friction itself begins with a coefficient that rises and a wide stick zone that narrows from round to round, so that no solve has to find many points' way
 //! across it at once. A round begins with the stiffness that the one before left, factorised, and ends as near to equilibrium as the pressures are to rest.
@@ -77,7 +77,8 @@ pub struct Rubbing {
 }
 
 /// The state of the contact that friction is made from, for each quadrature point of each face.
-struct Pressed {
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Pressed {
     /// Normal force (mN), face after face.
     forces_mn: Vec<f64>,
     /// Normal of the needle's surface, patch frame; zero where nothing presses.
@@ -123,17 +124,26 @@ impl Wall<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<(Equilibrium, Rubbing, Grip), FrictionError> {
-        let mut found = self.solve(load, positions, workspace, progress)?;
+        let before =
+            grip.holds().then(|| self.solve_as_before(load, coefficient, grip, &positions, workspace, progress));
+        let is_warm = matches!(before, Some(Ok(_)));
+        let (mut found, lost) = match before {
+            Some(Ok(found)) => (found, 0),
+            Some(Err(stop @ NewtonError::Interrupted { .. })) => return Err(stop.into()),
+            Some(Err(failure)) => (self.solve(load, positions, workspace, progress)?, failure.iterations()),
+            None => (self.solve(load, positions, workspace, progress)?, 0),
+        };
         let mut total = found.newton;
+        total.iterations += lost;
         let tip = Vector3::from_row_slice(&found.positions[3 * self.topology.needle()..]);
         let approach = self.approach(load, grip, &tip);
         let mut pressed = self.pressed(&found.positions);
         let (mut last_error, mut mix) = (Vec::new(), MIX.1);
-        let mut widening = FIRST_WIDENING;
+        let mut widening = if is_warm { 1.0 } else { FIRST_WIDENING };
         let mut tolerance = ROUND_TOLERANCE.1;
         let (mut change, mut last_change, mut cap) = (f64::INFINITY, f64::INFINITY, MIX.1);
         for round in 1..=MAX_ROUNDS {
-            let reached = coefficient.min(round as f64 * COEFFICIENT_STEP);
+            let reached = if is_warm { coefficient } else { coefficient.min(round as f64 * COEFFICIENT_STEP) };
             let settling = reached == coefficient && widening == 1.0;
             let points = self.rubbing_points(&approach, reached, &pressed);
             let friction = Friction { faces: &self.faces, points: &points, full_slip_mm: FULL_SLIP_MM * widening };
@@ -184,6 +194,27 @@ impl Wall<'_> {
         Err(FrictionError::NotSettled { rounds: MAX_ROUNDS, change, allowed: SETTLED })
     }
 
+    /// The equilibrium under the pressures that the last motion left, from which the new pressures are not far.
+    ///
+    /// # Errors
+    /// [`NewtonError`]: then the frictionless equilibrium is the start, as of a first motion.
+    fn solve_as_before(
+        &self,
+        load: &Load,
+        coefficient: f64,
+        grip: &Grip,
+        positions: &[f64],
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Equilibrium, NewtonError> {
+        let tip = Vector3::from_row_slice(&positions[3 * self.topology.needle()..]);
+        let points = self.rubbing_points(&self.approach(load, grip, &tip), coefficient, grip.pressed());
+        let friction = Friction { faces: &self.faces, points: &points, full_slip_mm: FULL_SLIP_MM };
+        let rubs = [Addition { effect: &friction, place: Place::Faces }];
+        let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
+        self.solve_directly(&Load { additions: &additions, ..*load }, positions.to_vec(), workspace, progress)
+    }
+
     /// One more solve from an equilibrium nearby, to `tolerance` relative to the force scale: with full steps, and where they fail with a line search.
     fn repeat(
         &self,
@@ -213,7 +244,7 @@ impl Wall<'_> {
     }
 
     /// Normal forces and normals of every quadrature point.
-    fn pressed(&self, positions: &[f64]) -> Pressed {
+    pub(super) fn pressed(&self, positions: &[f64]) -> Pressed {
         let contact = self.contact();
         let stencils = &self.topology.faces;
         let mut current = vec![0.0; 3 * stencils.group_size];

@@ -11,7 +11,7 @@
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-use super::friction::FULL_SLIP_MM;
+use super::friction::{FULL_SLIP_MM, Pressed};
 use super::{Load, Wall};
 use crate::effect::Local;
 use crate::effects::friction::{Friction, anchor};
@@ -24,12 +24,19 @@ pub struct Grip {
     anchors: Vec<Option<Point3<f64>>>,
     /// Positions at the end of the motion, the needle's tip last (mm); empty: those without contact.
     positions: Vec<f64>,
+    /// What pressed there.
+    pressed: Pressed,
 }
 
 impl Grip {
     /// Tissue at `positions` (mm; the needle's tip last) that the needle does not touch.
     pub fn free(positions: Vec<f64>) -> Self {
-        Grip { anchors: Vec::new(), positions }
+        Grip { positions, ..Grip::default() }
+    }
+
+    /// Normal forces and normals at the end of the motion.
+    pub(super) fn pressed(&self) -> &Pressed {
+        &self.pressed
     }
 
     /// Whether the needle holds the tissue anywhere.
@@ -95,6 +102,6 @@ impl Wall<'_> {
                 anchors[group * self.faces.points + rubbing.point] = Some(Point3::from(anchor));
             }
         }
-        Grip { anchors, positions: positions.to_vec() }
+        Grip { anchors, positions: positions.to_vec(), pressed: self.pressed(positions) }
     }
 }
