@@ -8,6 +8,7 @@
 mod answer;
 pub mod beds;
 mod bent;
+pub(crate) mod bond;
 pub mod budget;
 pub mod calibration;
 pub mod choice;

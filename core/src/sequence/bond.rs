@@ -6,7 +6,7 @@ use crate::effects::adhesion::rate::Opened;
 use crate::effects::adhesion::{Adhesion, Bond, Interface};
 use crate::equilibrium::Wall;
 use crate::mesh::wall::WallTopology;
-use crate::predict::finite_element::simulated_bond;
+use crate::predict::bond::simulated_bond;
 use crate::tissue::RetinalBond;
 
 /// The bond of one mesh.
