@@ -4,7 +4,9 @@
 //! of at most one driven vertex (the needle). The Hessian of the free part is sparse and symmetric (its lower triangle is kept,
 //! compressed by columns); the border is dense. All of it lies in one flat array of values, and [`Pattern`] knows for each entry of each
 //! local Hessian where it goes, so that assembly is a loop of additions.
-//! Not here: what the energies are, how the system is solved.
+//! Not here: what the energies are, how the system is solved. Read on in `tail` (the same for a few unknowns).
+
+pub(crate) mod tail;
 
 use crate::effect::{Local, Stencils, Term};
 
@@ -270,119 +272,6 @@ fn for_each_active(
                 visit(index, term, &local, other, hessian);
             }
         }
-    }
-}
-
-/// Which stresses the Hessian of the tail is made with.
-#[derive(Clone, Copy)]
-pub(crate) enum Stresses<'a> {
-    /// None: what is left is not negative in any direction.
-    None,
-    /// Those of the positions.
-    Current,
-    /// Those predicted.
-    Predicted(&'a Predicted),
-}
-
-/// The effects on the tail alone: those groups whose unknowns are all in the tail of `dofs` or in the border. Vectors and matrices count the tail's unknowns, then
-/// the border's three.
-#[derive(Clone, Copy)]
-pub(crate) struct Tail<'a> {
-    pub terms: &'a [Term<'a>],
-    pub dofs: &'a Dofs,
-    pub pattern: &'a Pattern,
-}
-
-impl Tail<'_> {
-    fn for_each_active(
-        &self,
-        positions: &[f64],
-        stresses: Stresses,
-        scratch: &mut Scratch,
-        mut visit: impl FnMut(usize, &Term, &Local, &mut Vec<f64>, &mut Vec<f64>),
-    ) {
-        let longest = self.terms.iter().map(|term| term.effect.predicted_len()).max().unwrap_or(0);
-        let none = vec![0.0; longest];
-        let Scratch { positions: current, other, hessian } = scratch;
-        for (index, term) in self.terms.iter().enumerate() {
-            current.resize(3 * term.stencils.group_size, 0.0);
-            let len = term.effect.predicted_len();
-            for &group in &self.pattern.tail_groups[term.set] {
-                term.stencils.gather(group, positions, current);
-                let predicted = match stresses {
-                    Stresses::None => &none[..len],
-                    Stresses::Current => &[],
-                    Stresses::Predicted(predicted) => predicted.of(index, group, len),
-                };
-                let local = Local { current, group, predicted };
-                if term.effect.is_active(&local) {
-                    visit(index, term, &local, other, hessian);
-                }
-            }
-        }
-    }
-
-    /// Their energy (µJ).
-    pub fn energy(&self, positions: &[f64], scratch: &mut Scratch) -> f64 {
-        let mut total = 0.0;
-        self.for_each_active(positions, Stresses::Current, scratch, |_, term, local, _, _| {
-            total += term.effect.energy(local);
-        });
-        total
-    }
-
-    /// Their gradient (mN).
-    pub fn gradient(&self, positions: &[f64], scratch: &mut Scratch) -> Vec<f64> {
-        let mut out = vec![0.0; self.dofs.tail + 3];
-        self.for_each_active(positions, Stresses::Current, scratch, |_, term, local, forces, _| {
-            let n = term.stencils.group_size;
-            forces.clear();
-            forces.resize(3 * n, 0.0);
-            term.effect.add_gradient(local, forces);
-            for (at, index) in self.unknowns(term, local.group).into_iter().enumerate() {
-                if let Some(index) = index {
-                    out[index] += forces[at];
-                }
-            }
-        });
-        out
-    }
-
-    /// Their Hessian (mN/mm), row by row, the lower triangle.
-    pub fn hessian(&self, positions: &[f64], stresses: Stresses, scratch: &mut Scratch, out: &mut Vec<f64>) {
-        let size = self.dofs.tail + 3;
-        out.clear();
-        out.resize(size * size, 0.0);
-        self.for_each_active(positions, stresses, scratch, |_, term, local, _, matrix| {
-            let n = 3 * term.stencils.group_size;
-            matrix.clear();
-            matrix.resize(n * n, 0.0);
-            term.effect.add_hessian(local, matrix);
-            let unknowns = self.unknowns(term, local.group);
-            for (at, row) in unknowns.iter().enumerate() {
-                for (value, column) in matrix[at * n..=at * n + at].iter().zip(&unknowns) {
-                    if let (Some(row), Some(column)) = (row, column) {
-                        out[row.max(column) * size + row.min(column)] += value;
-                    }
-                }
-            }
-        });
-    }
-
-    /// Replaces the stresses of these effects in `predicted` by those at `positions`.
-    pub fn keep_stresses(&self, positions: &[f64], scratch: &mut Scratch, predicted: &mut Predicted) {
-        self.for_each_active(positions, Stresses::Current, scratch, |index, term, local, moved, _| {
-            let len = term.effect.predicted_len();
-            moved.clear();
-            moved.resize(3 * term.stencils.group_size, 0.0);
-            term.effect.predict_stress(local, moved, &mut predicted.terms[index][local.group * len..][..len]);
-        });
-    }
-
-    /// Number within the tail of each unknown of a group, component-major; `None` for what is fixed.
-    fn unknowns(&self, term: &Term, group: usize) -> Vec<Option<usize>> {
-        let vertices = term.stencils.group(group);
-        (0..3).flat_map(|k| vertices.iter().map(move |&vertex| self.dofs.in_tail(vertex as usize, k))).collect()
     }
 }
 

@@ -1,12 +1,14 @@
 //! The equilibrium of one contact on one mesh: needle, wall and force in; positions, travel and reaction out.
 //!
 //! Patch frame throughout. [`Wall`] is the meshed problem; [`Wall::solve`] finds its equilibrium from a start, directly if it can, by load
-//! steps if it must. Read on in `load` (what is asked and answered), `guide` (how the tip is held), `attempts` (ways to an equilibrium), `light` (forces too small to move the tissue), `friction` (its repetition), `bleb` (fluid under the retina), `reading` (what is read
+//! steps if it must. Read on in `load` (what is asked and answered), `guide` (how the tip is held), `attempts` (ways to an equilibrium), `light` (forces too small to move the tissue), `friction` (its repetition), `grip` (what it remembers),
+//! `bleb` (fluid under the retina), `reading` (what is read
 //! off), `settled` (the wall under pressure alone). Not here: how fine a mesh a level uses, where the mesh is centred.
 
 mod attempts;
 pub mod bleb;
 pub mod friction;
+pub mod grip;
 mod guide;
 mod light;
 mod load;

@@ -8,6 +8,7 @@
 mod answer;
 pub mod beds;
 mod bent;
+pub(crate) mod bond;
 pub mod budget;
 pub mod calibration;
 pub mod choice;
@@ -47,7 +48,7 @@ use learned::RestPatch;
 use linear::press;
 use networks::Networks;
 use question::Begun;
-pub(crate) use question::{CutOrGrid, Question};
+pub(crate) use question::{CutOrGrid, Question, Sink};
 
 /// Normal force over the needle's cross-section, in Young's moduli of the softest retina, beyond which a force is refused: there the finite-element levels
 /// no longer converge throughout. A scene may let its tissue puncture earlier, which is told in the answer.

@@ -1,20 +1,23 @@
 //! A sequence: a timed list of needle poses and forces in, one surface after another out.
 //!
-//! Time runs from 0, when the tissue is at rest; the load of a step is reached at the step's time, linearly from the step before. Without an
-//! effect that remembers (`viscoelasticity`, `inertia`) every step is an equilibrium of its own, and the step before is only its
-//! start; with one, [`Simulation`] carries what is remembered from step to step.
+//! Time runs from 0, when the tissue is at rest under the pressure of its eye; the load of a step is reached at the step's time, linearly from the step before. Without
+//! memory every step is an equilibrium of its own, and the step before is only its start. Memory is of two kinds, and [`Simulation`] carries both from
+//! step to step: of time (`viscoelasticity`, `inertia`), and of the way, however slowly it is gone (`friction`: where the needle holds the tissue; `adhesion`:
+//! how far the bond was torn).
 //!
 //! Where the mesh stands: a mesh as coarse as `coarse` answers well only for the contact that it was made for (a contact of half the radius is off by a
 //! third of its motion). So without memory a step keeps the mesh, and starts from the step before, while its expected contact stays within
 //! two hundredths of a radius of the one that the mesh was laid around, as in a stream at haptic rate; else it gets a mesh of its own and a fresh linear
-//! start, and says so. Tissue once punctured stays so in every step that follows, which say since when. What tissue remembers lives in its elements: with memory one mesh lasts from first to last. It is laid around
-//! all expected contacts, level `coarse` divides it more finely ([`LASTING`]), and a step whose contact leaves its fine zone carries a
+//! start, and says so. Tissue once punctured stays so in every step that follows, which say since when. What tissue remembers lives in its elements and faces: with memory one mesh lasts from first to last. It is laid around
+//! all expected contacts, level `coarse` divides it more finely ([`LASTING`]) unless all of them are one and nothing depends on time, and a step whose contact leaves its fine zone carries a
 //! warning that says by how much.
 //!
-//! Read on in `plan` (every step checked before the first is computed), `rates` (which effects that remember are called for), `history` (what they
-//! remember), `advance` (one step). Not here: clocks, threads, the wire.
+//! Read on in `plan` (every step checked before the first is computed), `rates` (which effects of time are called for), `history` and `bond` (what is
+//! remembered), `advance` (one step), `cut` (a step in parts). Not here: clocks, threads, the wire.
 
 mod advance;
+mod bond;
+mod cut;
 mod history;
 mod plan;
 mod rates;
@@ -164,6 +167,8 @@ pub struct Simulation<'a> {
     next: usize,
     time_s: f64,
     needle: Needle,
+    /// Force of the tissue on it at the end of the last part of a step, scene coordinates (mN).
+    reaction_mn: Vector3<f64>,
     laid: Option<Laid>,
     settled: Option<Settled>,
     history: Option<History>,
@@ -201,13 +206,13 @@ impl<'a> Simulation<'a> {
         let body = sequence.needle.shape.body();
         let (patch, plan) = plan::plan(prepared, sequence, &body, progress)?;
         let first = |cause| SequenceError::At { step: 0, time_s: sequence.steps[0].time_s, cause };
-        let (decision, rates) = rates::decide(prepared, sequence, &plan).map_err(first)?;
+        let (decision, rates) = rates::decide(prepared, sequence, &plan);
         let resolution = resolution.unwrap_or(match sequence.level {
             Level::Reference => &REFERENCE,
-            _ if rates.any() => &LASTING,
+            _ if rates.any() || (decision.is_path_dependent() && !plan.is_one_contact()) => &LASTING,
             _ => &COARSE,
         });
-        let topology = shared_topology(resolution.division(&prepared.scene().tissue, false))
+        let topology = shared_topology(resolution.division(&prepared.scene().tissue, decision.adhesion))
             .map_err(|error| first(PredictError::Mesh(error)))?;
         let solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
         Ok(Simulation {
@@ -225,6 +230,7 @@ impl<'a> Simulation<'a> {
             next: 0,
             time_s: 0.0,
             needle: sequence.needle,
+            reaction_mn: Vector3::zeros(),
             laid: None,
             settled: None,
             history: None,
@@ -235,6 +241,11 @@ impl<'a> Simulation<'a> {
     /// Every effect, simulated or not, and why; the same for all steps.
     pub fn effects(&self) -> &[EffectReport] {
         &self.decision.reports
+    }
+
+    /// Whether a step depends on those before it: its mesh then lasts.
+    fn remembers(&self) -> bool {
+        self.rates.any() || self.decision.is_path_dependent()
     }
 
     /// Triangles between the nodes of every step's surface, counter-clockwise seen from the vitreous.
@@ -252,7 +263,6 @@ impl<'a> Simulation<'a> {
         let outcome = self.advance(step, progress);
         let (prediction, mesh_laid) = outcome.map_err(|cause| SequenceError::At { step: index, time_s, cause })?;
         self.next += 1;
-        self.time_s = time_s;
         Ok(Some(StepOutcome { step: index, time_s, mesh_laid, prediction }))
     }
 }

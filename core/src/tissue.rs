@@ -90,11 +90,20 @@ pub struct RetinalBond {
     pub strength_kpa: f64,
     /// Energy that letting go costs, mN/mm (the same number in N/m).
     pub fracture_energy_mn_per_mm: f64,
+    /// Power with which both grow with the speed of opening, in sequences; 0: they do not.
+    pub rate_exponent: f64,
+    /// Speed of opening from about which on they grow, mm/s.
+    pub reference_speed_mm_per_s: f64,
 }
 
 impl Default for RetinalBond {
     fn default() -> Self {
-        Self { strength_kpa: ranges::BOND_STRENGTH.default, fracture_energy_mn_per_mm: ranges::FRACTURE_ENERGY.default }
+        Self {
+            strength_kpa: ranges::BOND_STRENGTH.default,
+            fracture_energy_mn_per_mm: ranges::FRACTURE_ENERGY.default,
+            rate_exponent: ranges::BOND_RATE_EXPONENT.default,
+            reference_speed_mm_per_s: ranges::BOND_REFERENCE_SPEED.default,
+        }
     }
 }
 
@@ -184,6 +193,9 @@ impl Tissue {
         ranges::BOND_STRENGTH.check("tissue.bond.strength_kpa", self.bond.strength_kpa)?;
         let energy = self.bond.fracture_energy_mn_per_mm;
         ranges::FRACTURE_ENERGY.check("tissue.bond.fracture_energy_mn_per_mm", energy)?;
+        ranges::BOND_RATE_EXPONENT.check("tissue.bond.rate_exponent", self.bond.rate_exponent)?;
+        let speed = self.bond.reference_speed_mm_per_s;
+        ranges::BOND_REFERENCE_SPEED.check("tissue.bond.reference_speed_mm_per_s", speed)?;
         ranges::RETINA.thickness.check("tissue.retina.thickness_mm", self.retina_thickness_mm())?;
         self.rate.validate()
     }

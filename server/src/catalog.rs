@@ -18,7 +18,8 @@ use retina_core::scene::{Scene, SceneSurface};
 use retina_core::sequence::TIME_STEP;
 use retina_core::surface::{EYE_RADIUS, PIT_DEPTH, PIT_SIGMA};
 use retina_core::tissue::ranges::{
-    BOND_STRENGTH, CHOROID, FRACTURE_ENERGY, INNER_LIMITING_MEMBRANE, LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA,
+    BOND_RATE_EXPONENT, BOND_REFERENCE_SPEED, BOND_STRENGTH, CHOROID, FRACTURE_ENERGY, INNER_LIMITING_MEMBRANE,
+    LayerRanges, RETINA, RETINA_SUBLAYER, SCLERA,
 };
 use retina_core::tissue::rate::{DENSITY, PronyTerm, RELAXATION_SHARE, RELAXATION_TIME, RateProperties, VITREOUS_DRAG};
 use retina_core::tissue::{Layer, Tissue};
@@ -200,6 +201,8 @@ fn tissue(tissue: &Tissue) -> TissueSpec {
         bond: Some(BondSpec {
             strength_kpa: Some(tissue.bond.strength_kpa),
             fracture_energy_mn_per_mm: Some(tissue.bond.fracture_energy_mn_per_mm),
+            rate_exponent: Some(tissue.bond.rate_exponent),
+            reference_speed_mm_per_s: Some(tissue.bond.reference_speed_mm_per_s),
         }),
         rate: Some(rate(&tissue.rate)),
     }
@@ -231,6 +234,8 @@ fn parameters() -> Vec<ParameterEntry> {
         ("scene.pose.position_mm", &TIP_COORDINATE),
         ("scene.tissue.bond.strength_kpa", &BOND_STRENGTH),
         ("scene.tissue.bond.fracture_energy_mn_per_mm", &FRACTURE_ENERGY),
+        ("scene.tissue.bond.rate_exponent", &BOND_RATE_EXPONENT),
+        ("scene.tissue.bond.reference_speed_mm_per_s", &BOND_REFERENCE_SPEED),
         ("scene.tissue.rate.retina_relaxation[].relaxation_time_s", &RELAXATION_TIME),
         ("scene.tissue.rate.retina_relaxation[].share", &RELAXATION_SHARE),
         ("scene.tissue.rate.density_kg_per_mm3", &DENSITY),

@@ -323,7 +323,8 @@ const UNHARMED: f64 = 0.02;
 #[test]
 fn a_strong_bond_is_as_good_as_none_and_a_weak_one_lets_go() {
     let bonded = |strength_kpa: f64, fracture_energy_mn_per_mm: f64| {
-        changed("flat", |scene| scene.tissue.bond = RetinalBond { strength_kpa, fracture_energy_mn_per_mm })
+        let bond = RetinalBond { strength_kpa, fracture_energy_mn_per_mm, ..RetinalBond::default() };
+        changed("flat", |scene| scene.tissue.bond = bond)
     };
     for (request, name) in [(straight(Level::Coarse, 1.0), "straight"), (leaning(Level::Coarse, 0.5, 30.0), "leaning")]
     {

@@ -10,6 +10,7 @@ mod effects;
 mod equilibrium;
 mod frames;
 mod learned;
+mod paths;
 mod puncture;
 mod refusals;
 mod repeatability;

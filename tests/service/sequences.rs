@@ -227,3 +227,44 @@ fn the_program_simulates_as_the_service_does() {
     assert_eq!((code, output.as_str()), (1, ""));
     assert!(problems.contains("\"steps\""), "{problems}");
 }
+
+#[test]
+fn a_drag_with_friction_sticks_slips_and_says_so() {
+    let service = Running::start(&["--threads", "1"]);
+    let places = [0.0, 0.01, 0.02, 0.03, 0.04, 0.04, 0.03, 0.02, 0.01, 0.0, -0.01];
+    let steps: Vec<Value> =
+        (0..).zip(places).map(|(k, x)| json!({"time_s": 0.1 * f64::from(k + 1), "tip_mm": [x, 0.0, -0.06]})).collect();
+    let dragging = json!({
+        "scene": {"surface": {"kind": "flat"}, "friction_coefficient": 0.3, "pressure_kpa": 2.5},
+        "needle": {"tip_mm": [0.0, 0.0, 0.1]},
+        "steps": steps,
+        "effects": ["elasticity", "finite_strain", "contact", "friction", "pressure", "viscoelasticity"],
+    });
+    let (status, _, body) = simulate(&service, &dragging);
+    assert_eq!(status, 200, "{body}");
+    let lines = lines(&body);
+    let simulated = |name: &str| {
+        let effects = lines[0]["begin"]["effects"].as_array().expect("list");
+        effects.iter().any(|effect| effect["name"] == name && effect["simulated"] == true)
+    };
+    assert!(["friction", "pressure", "viscoelasticity"].into_iter().all(simulated), "{}", lines[0]);
+    let steps: Vec<&Value> = lines[1..=places.len()].iter().map(|line| &line["step"]).collect();
+    steps.iter().zip(&lines[1..]).for_each(|(_, line)| assert_matches("SimulateLine", line));
+    let drag = |k: usize| steps[k]["needle"]["reaction_mn"][0].as_f64().expect("number");
+    let share = |k: usize| steps[k]["contact"]["slipping_share"].as_f64().expect("number");
+    let states: Vec<&str> = steps.iter().map(|step| step["contact"]["state"].as_str().expect("state")).collect();
+    assert!(drag(1) < 0.0 && drag(3) < drag(1), "the tissue holds the needle back");
+    assert_eq!((states[4], states[10]), ("slipping", "slipping"), "{states:?}");
+    assert!(share(4) > 0.9 && share(6) < 0.9, "turned back it sticks at first: {} {}", share(4), share(6));
+    assert!(drag(10) > 0.0, "and is held back the other way");
+    // The same by auto, which says why; a bond out of its range is refused by name.
+    let auto = with(dragging.clone(), "/effects", json!("auto"));
+    let begin = self::lines(&simulate(&service, &auto).2).remove(0);
+    let effects = begin["begin"]["effects"].as_array().expect("list").clone();
+    let friction = effects.iter().find(|effect| effect["name"] == "friction").expect("always there");
+    assert!(friction["simulated"] == true && friction["value"].as_f64() > friction["threshold"].as_f64(), "{friction}");
+    let wrong = with(dragging, "/scene/tissue", json!({"bond": {"rate_exponent": 0.7}}));
+    let (status, _, body) = simulate(&service, &wrong);
+    let problem: Value = serde_json::from_str(&body).expect("JSON");
+    assert_eq!((status, &problem["errors"][0]["field"]), (422, &json!("scene.tissue.bond.rate_exponent")), "{body}");
+}

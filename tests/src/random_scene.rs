@@ -194,7 +194,7 @@ impl SceneNumbers {
             retina: self.retina.iter().map(|layer| layer.layer()).collect(),
             choroid: self.choroid.layer(),
             sclera: self.sclera.layer(),
-            bond: RetinalBond { strength_kpa, fracture_energy_mn_per_mm },
+            bond: RetinalBond { strength_kpa, fracture_energy_mn_per_mm, ..RetinalBond::default() },
             ..Tissue::default()
         };
         let [rest_pressure_kpa, pressure_kpa] = self.pressures_kpa;

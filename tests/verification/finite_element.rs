@@ -10,3 +10,4 @@ mod manufactured;
 mod peel;
 mod pressed_needle;
 mod pressed_slab;
+mod stick_slip;

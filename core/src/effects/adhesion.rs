@@ -11,14 +11,19 @@
 //! K stands for nothing in the tissue; it is only so large that intact tissue does not feel it: [`STIFFNESS_KPA_PER_MM`] yields 0.3 µm under 30 kPa, the largest
 //! pressure of a needle short of puncture, and leaves δ₀ far below δ_f. The normal does not turn with the surface: openings are small against the radius of whatever bends it.
 //!
+//! A bond may hold more the faster it is opened: [`rate`].
+//!
 //! Law: forces on the two faces are equal and opposite; a closed cycle of openings never gives energy back beyond what it took.
 //! Not here: which vertices the faces have (`mesh::wall`), fluid between them.
+
+pub mod rate;
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::contact::ContactFaces;
 use crate::effect::{Effect, Local, Stencils};
 use crate::mesh::element::{FACE_NODES, TOP_NODES, gauss_rule, shapes};
+use rate::Opened;
 
 /// Name of the effect.
 pub const NAME: &str = "adhesion";
@@ -130,6 +135,8 @@ pub struct Adhesion<'a> {
     pub bond: Bond,
     /// Largest effective opening of the past at every quadrature point, face by face (mm).
     pub largest_mm: &'a [f64],
+    /// How fast it is opened, where it holds more for that.
+    pub opened: Option<Opened<'a>>,
 }
 
 /// The opening at one point, split.
@@ -157,6 +164,19 @@ impl Adhesion<'_> {
         local.group * self.interface.points() + point
     }
 
+    /// ψ, ψ′ and ψ″ of one point at the effective opening `o` (mm).
+    fn potential(&self, o: f64, at: usize) -> (f64, f64, f64) {
+        match &self.opened {
+            None => self.bond.potential(o, self.largest_mm[at]),
+            Some(opened) => opened.potential(&self.bond, o, self.largest_mm[at], at),
+        }
+    }
+
+    /// The present effective openings of a group (mm).
+    pub fn present<'b>(&'b self, local: &'b Local) -> impl Iterator<Item = f64> + 'b {
+        (0..self.interface.points()).map(move |point| self.opening(local, point).parting.norm())
+    }
+
     /// The largest effective openings of a group once these positions are taken (mm): those of the past, or the present ones.
     pub fn openings<'b>(&'b self, local: &'b Local) -> impl Iterator<Item = f64> + 'b {
         (0..self.interface.points())
@@ -169,7 +189,7 @@ impl Adhesion<'_> {
             let n = self.interface.normals[self.at(local, point)];
             let Opening { normal, parting } = self.opening(local, point);
             let o = parting.norm();
-            let (_, slope, curvature) = self.bond.potential(o, self.largest_mm[self.at(local, point)]);
+            let (_, slope, curvature) = self.potential(o, self.at(local, point));
             let along = parting.try_normalize(0.0).unwrap_or_default();
             let over = if o > 0.0 { slope / o } else { curvature };
             let across = n * n.transpose();
@@ -196,7 +216,7 @@ impl Effect for Adhesion<'_> {
             .map(|(point, area)| {
                 let Opening { normal, parting } = self.opening(local, point);
                 let closed = 0.5 * self.bond.stiffness_kpa_per_mm * normal.min(0.0).powi(2);
-                area * (self.bond.potential(parting.norm(), self.largest_mm[self.at(local, point)]).0 + closed)
+                area * (self.potential(parting.norm(), self.at(local, point)).0 + closed)
             })
             .sum()
     }

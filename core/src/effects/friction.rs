@@ -5,7 +5,7 @@
 //! anchor (needle frame) and n̂ the needle's surface normal, the slip is g = (1 − n̂ n̂ᵀ)(x − t − R a): how far the tissue has come along the needle's surface
 //! from where the needle would have caught it. Tissue that sticks stays at its anchor. What a neighbourhood moves a point sideways before the needle
 //! reaches it counts as slip; in nearly incompressible tissue that is little. The load is one monotonic motion, so slip has one direction and the
-//! friction a potential (deformation theory); a motion in several parts is a sequence of such problems, each from the anchors of the last.
+//! friction a potential (deformation theory); a motion in several parts is a sequence of such problems, each from the anchors that the last one left ([`Friction::dragged`]).
 //!
 //! Energy per rest area: µ p̂ f₀(|g|), with f₀ the C² approximation of |g| of Li et al. (*Incremental Potential Contact*, ACM Trans. Graph. 2020, section
 //! 5.2; here of slip and not of velocity): f₀′(y) = f₁(y) = 2y/ε − y²/ε² for y < ε, 1 beyond. The pressure p̂ and the normal n̂ are those of an
@@ -84,6 +84,8 @@ fn nearest(shape: &Body, mut at: Point3<f64>) -> Point3<f64> {
     at
 }
 
+/// Share of the slip ε that is left where a slip ends.
+const AT_REST: f64 = 0.99;
 /// Iterations of the way to the anchor.
 const ANCHOR_ITERATIONS: usize = 60;
 /// Precision of the anchor, in needle radii.
@@ -94,6 +96,12 @@ const LEAST_CLOSING: f64 = 1e-3;
 impl Friction<'_> {
     /// Slip of a point (mm).
     fn slip(&self, local: &Local, rubbing: &RubbingPoint) -> Vector3<f64> {
+        let offset = self.offset(local, rubbing);
+        offset - rubbing.normal * rubbing.normal.dot(&offset)
+    }
+
+    /// From a point's anchor to where it is (mm).
+    fn offset(&self, local: &Local, rubbing: &RubbingPoint) -> Vector3<f64> {
         let n = FACE_NODES + 1;
         let mut offset = -rubbing.anchor;
         for k in 0..3 {
@@ -101,7 +109,18 @@ impl Friction<'_> {
             let values = self.faces.values(rubbing.point);
             offset[k] += values.iter().zip(row).map(|(value, x)| value * x).sum::<f64>() - row[FACE_NODES];
         }
-        offset - rubbing.normal * rubbing.normal.dot(&offset)
+        offset
+    }
+
+    /// The anchor (from the tip, in the frame of the positions, mm) that a point has after this slip: the old one while it sticks; what slips drags it behind
+    /// itself at the distance [`AT_REST`] ε, where friction is short of its limit by one part in ten thousand, so that a needle that stops meets tissue that sticks.
+    pub fn dragged(&self, local: &Local, rubbing: &RubbingPoint) -> Vector3<f64> {
+        let slip = self.slip(local, rubbing);
+        let y = slip.norm();
+        if y < self.full_slip_mm {
+            return rubbing.anchor;
+        }
+        rubbing.anchor + self.offset(local, rubbing) - slip * (AT_REST * self.full_slip_mm / y)
     }
 
     /// f₀, f₁(y)/y and f₁′ (mm, 1/mm, 1/mm) at the slip y (mm).

@@ -133,6 +133,21 @@ impl Networks {
         }
     }
 
+    /// Takes these positions (x, y, z of each vertex) (mm) for those at which the tissue has been at rest for ever: every network has relaxed there, G = C⁻¹.
+    pub fn settle(&mut self, geometry: &SolidGeometry, stencils: &Stencils, positions: &[f64]) {
+        let mut local = [0.0; 3 * NODES];
+        let networks = self.networks.len();
+        for element in (0..stencils.len()).filter(|&element| self.shear_kpa[element] > 0.0) {
+            stencils.gather(element, positions, &mut local);
+            for q in 0..POINTS {
+                let point = element * POINTS + q;
+                let inverse = inverse_metric(&geometry.deformation_gradient(element, q, &local));
+                self.memory[point * networks..(point + 1) * networks].fill(inverse);
+                self.inverse[point] = inverse;
+            }
+        }
+    }
+
     /// Free energy that the networks store at the last commit (µJ).
     pub fn stored_energy_uj(&self, geometry: &SolidGeometry) -> f64 {
         let mut total = 0.0;

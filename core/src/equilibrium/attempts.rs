@@ -127,6 +127,23 @@ impl Wall<'_> {
         Err(failure)
     }
 
+    /// As [`Wall::solve`], without load steps where the start is no good one.
+    ///
+    /// # Errors
+    /// [`NewtonError`].
+    pub(super) fn solve_directly(
+        &self,
+        load: &Load,
+        positions: Vec<f64>,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Equilibrium, NewtonError> {
+        let mut spent = 0;
+        let mut found = self.follow(load, &ATTEMPTS[0], positions, &mut spent, workspace, progress)?;
+        found.newton.iterations = spent;
+        Ok(found)
+    }
+
     /// The tissue at rest and the needle just overlapping it.
     fn touching(&self, load: &Load) -> Vec<f64> {
         let Load { motion, touch_mm, .. } = *load;

@@ -1,18 +1,19 @@
 //! The repetition that friction needs: solve, take new contact pressures and normals, solve again, until they settle.
 //!
-//! It starts from the frictionless equilibrium. The pressures of the next round are a mix of those used and those found (Irons & Tuck 1969): where the
+//! It starts from the frictionless equilibrium, or after another motion from the equilibrium under the pressures that this one left. The pressures of the next round are a mix of those used and those found (Irons & Tuck 1969): where the
 //! force along the motion is shared between pressure and friction, each round answers the last one's error with one of the opposite sign, and plain repetition
 //! would diverge beyond µ tan(angle) = 1. The friction itself begins with a coefficient that rises and a wide stick zone that narrows from round to round, so that no solve has to find many points' way
 //! across it at once. A round begins with the stiffness that the one before left, factorised, and ends as near to equilibrium as the pressures are to rest.
-//! Not here: the energy (`effects::friction`).
+//! Not here: the energy (`effects::friction`), what is remembered of earlier motions (`grip`).
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::attempts::REPETITIONS;
+use super::grip::{Approach, Grip};
 use super::{Addition, Equilibrium, Load, Wall};
 use crate::effect::{Effect, Local};
-use crate::effects::friction::{Friction, RubbingPoint, anchor};
+use crate::effects::friction::{Friction, RubbingPoint};
 use crate::mesh::wall::Place;
 use crate::progress::Progress;
 use crate::solve::newton::{NewtonError, NewtonReport, Workspace};
@@ -76,7 +77,8 @@ pub struct Rubbing {
 }
 
 /// The state of the contact that friction is made from, for each quadrature point of each face.
-struct Pressed {
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Pressed {
     /// Normal force (mN), face after face.
     forces_mn: Vec<f64>,
     /// Normal of the needle's surface, patch frame; zero where nothing presses.
@@ -105,17 +107,45 @@ impl Wall<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<(Equilibrium, Rubbing), FrictionError> {
-        let mut found = self.solve(load, positions, workspace, progress)?;
+        let found = self.solve_gripped(load, coefficient, &Grip::default(), positions, workspace, progress);
+        found.map(|(equilibrium, rubbing, _)| (equilibrium, rubbing))
+    }
+
+    /// As [`Wall::solve_with_friction`], after motions that left the needle with `grip`; the grip that this one leaves.
+    ///
+    /// # Errors
+    /// [`FrictionError`].
+    pub fn solve_gripped(
+        &self,
+        load: &Load,
+        coefficient: f64,
+        grip: &Grip,
+        positions: Vec<f64>,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<(Equilibrium, Rubbing, Grip), FrictionError> {
+        let before =
+            grip.holds().then(|| self.solve_as_before(load, coefficient, grip, &positions, workspace, progress));
+        let is_warm = matches!(before, Some(Ok(_)));
+        let (mut found, lost) = match before {
+            Some(Ok(found)) => (found, 0),
+            Some(Err(stop @ NewtonError::Interrupted { .. })) => return Err(stop.into()),
+            Some(Err(failure)) => (self.solve(load, positions, workspace, progress)?, failure.iterations()),
+            None => (self.solve(load, positions, workspace, progress)?, 0),
+        };
         let mut total = found.newton;
+        total.iterations += lost;
+        let tip = Vector3::from_row_slice(&found.positions[3 * self.topology.needle()..]);
+        let approach = self.approach(load, grip, &tip);
         let mut pressed = self.pressed(&found.positions);
         let (mut last_error, mut mix) = (Vec::new(), MIX.1);
-        let mut widening = FIRST_WIDENING;
+        let mut widening = if is_warm { 1.0 } else { FIRST_WIDENING };
         let mut tolerance = ROUND_TOLERANCE.1;
         let (mut change, mut last_change, mut cap) = (f64::INFINITY, f64::INFINITY, MIX.1);
         for round in 1..=MAX_ROUNDS {
-            let reached = coefficient.min(round as f64 * COEFFICIENT_STEP);
+            let reached = if is_warm { coefficient } else { coefficient.min(round as f64 * COEFFICIENT_STEP) };
             let settling = reached == coefficient && widening == 1.0;
-            let points = self.rubbing_points(load, reached, &pressed);
+            let points = self.rubbing_points(&approach, reached, &pressed);
             let friction = Friction { faces: &self.faces, points: &points, full_slip_mm: FULL_SLIP_MM * widening };
             let rubs = [Addition { effect: &friction, place: Place::Faces }];
             let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
@@ -131,7 +161,8 @@ impl Wall<'_> {
             }
             if settling && change <= SETTLED {
                 let rubbing = self.rubbing(&friction, &found.positions, round);
-                return Ok((Equilibrium { newton: total, ..found }, rubbing));
+                let left = self.grip(&friction, &found.positions);
+                return Ok((Equilibrium { newton: total, ..found }, rubbing, left));
             }
             let error: Vec<f64> = now.forces_mn.iter().zip(&pressed.forces_mn).map(|(new, used)| new - used).collect();
             if settling && last_error.len() == error.len() {
@@ -163,6 +194,27 @@ impl Wall<'_> {
         Err(FrictionError::NotSettled { rounds: MAX_ROUNDS, change, allowed: SETTLED })
     }
 
+    /// The equilibrium under the pressures that the last motion left, from which the new pressures are not far.
+    ///
+    /// # Errors
+    /// [`NewtonError`]: then the frictionless equilibrium is the start, as of a first motion.
+    fn solve_as_before(
+        &self,
+        load: &Load,
+        coefficient: f64,
+        grip: &Grip,
+        positions: &[f64],
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Equilibrium, NewtonError> {
+        let tip = Vector3::from_row_slice(&positions[3 * self.topology.needle()..]);
+        let points = self.rubbing_points(&self.approach(load, grip, &tip), coefficient, grip.pressed());
+        let friction = Friction { faces: &self.faces, points: &points, full_slip_mm: FULL_SLIP_MM };
+        let rubs = [Addition { effect: &friction, place: Place::Faces }];
+        let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
+        self.solve_directly(&Load { additions: &additions, ..*load }, positions.to_vec(), workspace, progress)
+    }
+
     /// One more solve from an equilibrium nearby, to `tolerance` relative to the force scale: with full steps, and where they fail with a line search.
     fn repeat(
         &self,
@@ -192,7 +244,7 @@ impl Wall<'_> {
     }
 
     /// Normal forces and normals of every quadrature point.
-    fn pressed(&self, positions: &[f64]) -> Pressed {
+    pub(super) fn pressed(&self, positions: &[f64]) -> Pressed {
         let contact = self.contact();
         let stencils = &self.topology.faces;
         let mut current = vec![0.0; 3 * stencils.group_size];
@@ -217,33 +269,21 @@ impl Wall<'_> {
     }
 
     /// The points that rub, face by face, with their anchors.
-    fn rubbing_points(&self, load: &Load, coefficient: f64, pressed: &Pressed) -> Vec<Vec<RubbingPoint>> {
-        let stencils = &self.topology.faces;
-        let pose = &self.tool.patch_from_needle;
-        let direction = pose.inverse_transform_unit_vector(&load.motion.direction);
-        let start = self.start();
+    fn rubbing_points(&self, approach: &Approach, coefficient: f64, pressed: &Pressed) -> Vec<Vec<RubbingPoint>> {
         let face = |group: usize| -> Vec<RubbingPoint> {
-            let vertices = stencils.group(group);
-            let rest = |point: usize| -> Point3<f64> {
-                let node = |vertex: u32| Vector3::from_row_slice(&start[3 * vertex as usize..][..3]);
-                Point3::from(
-                    self.faces.values(point).iter().zip(vertices).map(|(v, &n)| node(n) * *v).sum::<Vector3<f64>>(),
-                )
-            };
             let rubs = |&point: &usize| pressed.normals[group * self.faces.points + point] != Vector3::zeros();
             let rubbing = |point: usize| {
                 let at = group * self.faces.points + point;
-                let anchor = anchor(self.tool.body, &pose.inverse_transform_point(&rest(point)), &direction);
                 RubbingPoint {
                     point,
                     limit_mn: coefficient * pressed.forces_mn[at],
                     normal: pressed.normals[at],
-                    anchor: pose.rotation * anchor.coords,
+                    anchor: approach.anchor(self, group, point),
                 }
             };
             (0..self.faces.points).filter(rubs).map(rubbing).collect()
         };
-        (0..stencils.len()).map(face).collect()
+        (0..self.topology.faces.len()).map(face).collect()
     }
 
     /// What slips, and with what force.

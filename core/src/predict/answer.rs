@@ -66,12 +66,12 @@ impl Question<'_> {
     }
 
     /// What is expected of the effects of a needle that does not press.
-    fn unpressed(&self, sink: &Sink) -> Expected {
+    pub(crate) fn unpressed(&self, sink: &Sink) -> Expected {
         let scene = &self.prepared.scene;
         Expected {
             depth_mm: sink.expected_mm,
             strain: sink.expected_mm / self.yielding_mm(),
-            sliding: Sliding { coefficient: scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0 },
+            sliding: Sliding { coefficient: scene.friction_coefficient, depth_mm: 0.0, tangent: 0.0, along_mm: 0.0 },
             pull: Pull {
                 normal_force_mn: 0.0,
                 tangential_share: 0.0,
@@ -85,7 +85,7 @@ impl Question<'_> {
     }
 
     /// What the linear answer expects of the effects.
-    pub(super) fn expected(&self, linear: &LinearAnswer, sink: &Sink) -> Expected {
+    pub(crate) fn expected(&self, linear: &LinearAnswer, sink: &Sink) -> Expected {
         let still = self.unpressed(sink);
         let moved_mm = linear.depth_mm + sink.expected_mm;
         let [x, y] = linear.press.touch.parameter;

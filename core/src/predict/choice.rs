@@ -63,6 +63,11 @@ impl Decision {
         }
         self
     }
+
+    /// Whether where the tissue ends up depends on the way there, however slowly it is gone.
+    pub fn is_path_dependent(&self) -> bool {
+        self.friction || self.adhesion
+    }
 }
 
 /// What the linear answer predicts.

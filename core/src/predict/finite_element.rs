@@ -7,7 +7,7 @@ use super::over_fluid::around_bleb;
 use super::types::{ContactReport, ContactState, PredictError, SolverReport};
 use crate::effects::pressure::Pressure;
 use crate::equilibrium::bleb::Bleb;
-use crate::equilibrium::friction::FrictionError;
+use crate::equilibrium::friction::{FrictionError, Rubbing};
 use crate::equilibrium::settled::Settled;
 use crate::equilibrium::{
     Addition, ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Strains, Tool, Wall,
@@ -254,11 +254,8 @@ impl Problem<'_> {
         };
         progress.stage("surface");
         let mut answer = self.answer(&wall, resolution, &equilibrium, touch_mm);
-        if let Some(rubbing) = rubbing.filter(|_| answer.contact.state == ContactState::Touching) {
-            answer.contact.slipping_share = Some(rubbing.slipping_share);
-            if rubbing.slipping_share > SLIPPING_FROM {
-                answer.contact.state = ContactState::Slipping;
-            }
+        if let Some(rubbing) = &rubbing {
+            answer.contact.rub(rubbing);
         }
         let positions = &equilibrium.positions;
         answer.contact.bond_damage = held.as_ref().zip(self.bond).map(|(held, _)| held.damage(&wall, positions));
@@ -372,6 +369,18 @@ impl Problem<'_> {
                 travel_mm: equilibrium.travel_mm,
                 deflection: equilibrium.deflection.unwrap_or_default(),
             },
+        }
+    }
+}
+
+impl ContactReport {
+    /// Says how a contact rubs.
+    pub(crate) fn rub(&mut self, rubbing: &Rubbing) {
+        if self.state == ContactState::Touching {
+            self.slipping_share = Some(rubbing.slipping_share);
+            if rubbing.slipping_share > SLIPPING_FROM {
+                self.state = ContactState::Slipping;
+            }
         }
     }
 }

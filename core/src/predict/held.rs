@@ -1,5 +1,6 @@
 //! What holds the retina on the choroid, and the fluid between them: the pieces of a solve that has an interface.
 
+use super::bond::simulated_bond;
 use super::finite_element::Problem;
 use super::types::BlebReport;
 use crate::effect::Local;
@@ -9,6 +10,12 @@ use crate::equilibrium::Wall;
 
 /// Strength of a bond that is not simulated to part (kPa): the retina holds outside of a bleb.
 const UNBREAKABLE_KPA: f64 = 1e6;
+/// Such a bond; its energy is twice what it takes to open it to its strength, so that the law stays a law.
+const UNBREAKABLE: Bond = Bond {
+    strength_kpa: UNBREAKABLE_KPA,
+    fracture_energy_mn_per_mm: UNBREAKABLE_KPA * UNBREAKABLE_KPA / STIFFNESS_KPA_PER_MM,
+    stiffness_kpa_per_mm: STIFFNESS_KPA_PER_MM,
+};
 
 /// The interface of one solve.
 pub(super) struct Held {
@@ -28,12 +35,7 @@ impl Held {
         }
         let stencils = &wall.topology().interface;
         let interface = Interface::new(stencils, &wall.geometry.rest);
-        let (strength_kpa, fracture_energy_mn_per_mm) = match problem.bond {
-            Some(bond) => (bond.strength_kpa, bond.fracture_energy_mn_per_mm),
-            // Twice what it takes to open such a bond to its strength, so that the law stays a law.
-            None => (UNBREAKABLE_KPA, UNBREAKABLE_KPA * UNBREAKABLE_KPA / STIFFNESS_KPA_PER_MM),
-        };
-        let bond = Bond { strength_kpa, fracture_energy_mn_per_mm, stiffness_kpa_per_mm: STIFFNESS_KPA_PER_MM };
+        let bond = problem.bond.as_ref().map_or(UNBREAKABLE, simulated_bond);
         let detached = match &problem.bleb {
             Some(bleb) => wall.detached(bleb),
             None => vec![false; stencils.len()],
@@ -46,7 +48,7 @@ impl Held {
 
     /// The bond.
     pub fn adhesion(&self) -> Adhesion<'_> {
-        Adhesion { interface: &self.interface, bond: self.bond, largest_mm: &self.largest_mm }
+        Adhesion { interface: &self.interface, bond: self.bond, largest_mm: &self.largest_mm, opened: None }
     }
 
     /// The fluid of `problem`, if it has any.

@@ -242,6 +242,7 @@ fn decided(question: &Question, linear: &LinearAnswer) -> Result<Decision, Predi
             coefficient: question.prepared.scene().friction_coefficient,
             depth_mm: linear.depth_mm,
             tangent: linear.press.tangent(),
+            along_mm: 0.0,
         },
         pull: Pull {
             normal_force_mn: linear.normal_force_mn,

@@ -72,7 +72,7 @@ pub(crate) struct Sink {
     /// The decision about the effect.
     pub(crate) report: EffectReport,
     /// Change of the pressure (kPa), where it is simulated.
-    pub(super) change_kpa: Option<f64>,
+    pub(crate) change_kpa: Option<f64>,
     /// Fluid under the retina, where it is simulated.
     pub(super) bleb: Option<Bleb>,
     /// Largest sinking and rising of a node that is expected of them, in magnitude (mm); 0 where they are not simulated.
@@ -130,7 +130,15 @@ impl Question<'_> {
     }
 
     /// What the eye's pressure and fluid under the retina do by themselves.
-    pub(crate) fn sink(&self) -> Sink {
+    pub(super) fn sink(&self) -> Sink {
+        let mut sink = self.sink_without_fluid();
+        sink.bleb = self.bleb().filter(|_| self.lifting(self.request.level).simulated);
+        sink.expected_mm += sink.bleb.map_or(0.0, |bleb| bleb.expected_rise_mm(bleb.center));
+        sink
+    }
+
+    /// What the eye's pressure does by itself.
+    pub(crate) fn sink_without_fluid(&self) -> Sink {
         let Scene { tissue, .. } = &self.prepared.scene;
         let change_kpa = self.prepared.scene.pressure_change_kpa();
         let laws =
@@ -145,13 +153,11 @@ impl Question<'_> {
         let sink_mm = if finite.abs() > linear.abs() { finite } else { linear };
         let report = pressure::report(&self.request.effects, change_kpa, sink_mm * 1e3);
         let simulated = report.simulated;
-        let bleb = self.bleb().filter(|_| self.lifting(self.request.level).simulated);
-        let rise_mm = bleb.map_or(0.0, |bleb| bleb.expected_rise_mm(bleb.center));
-        let expected_mm = if simulated { sink_mm.abs() } else { 0.0 } + rise_mm;
-        Sink { report, change_kpa: simulated.then_some(change_kpa), bleb, expected_mm }
+        let expected_mm = if simulated { sink_mm.abs() } else { 0.0 };
+        Sink { report, change_kpa: simulated.then_some(change_kpa), bleb: None, expected_mm }
     }
 
-    pub(super) fn decide(&self, expected: Expected, sink: &Sink) -> Result<Decision, PredictError> {
+    pub(crate) fn decide(&self, expected: Expected, sink: &Sink) -> Result<Decision, PredictError> {
         if let (Some(change_kpa), Some(settled)) = (sink.change_kpa, self.settled(sink.change_kpa, Solid::FiniteStrain))
             && settled.max_strain() > MAX_SETTLED_STRAIN
         {
@@ -179,7 +185,7 @@ impl Question<'_> {
     }
 
     /// The tool as it stands to the surface at rest: raised by what the surface under it has sunk, lowered by what fluid has raised it.
-    pub(super) fn raised(&self, sink: &Sink) -> Tool<'_> {
+    pub(crate) fn raised(&self, sink: &Sink) -> Tool<'_> {
         let mut tool = self.tool;
         if let Some(bleb) = &sink.bleb {
             let at = tool.patch_from_needle.translation.vector;

@@ -8,7 +8,11 @@ use nalgebra::Vector3;
 use super::history::History;
 use super::plan::{fits, outside, pressed};
 use super::{Laid, Settled, Simulation, Step};
-use crate::equilibrium::{Load, MeshSize, Motion};
+use crate::effects::pressure::Pressure;
+use crate::equilibrium::friction::{FrictionError, Rubbing};
+use crate::equilibrium::grip::Grip;
+use crate::equilibrium::{Addition, Equilibrium, Load, MeshSize, Motion, Wall};
+use crate::mesh::wall::Place;
 use crate::predict::expected_error::ExpectedError;
 use crate::predict::finite_element::{COARSE, ContactEstimate, Problem};
 use crate::predict::linear::LinearAnswer;
@@ -30,7 +34,7 @@ struct Aim {
 
 impl Simulation<'_> {
     /// The answer to `step`, and whether a mesh was laid for it.
-    pub(super) fn advance(
+    pub(super) fn advance_at_once(
         &mut self,
         step: &Step,
         progress: &mut dyn Progress,
@@ -41,8 +45,8 @@ impl Simulation<'_> {
         // The patch is taken out so that the question may borrow it while the rest of the state changes.
         let patch = self.patch.patch().clone();
         let question = Question::new(prepared, &request, &body, CutOrGrid::Grid(&patch));
-        let linear = pressed(&question)?;
-        let (mut prediction, laid) = if self.decision.contact && (linear.is_some() || self.rates.any()) {
+        let linear = pressed(&question, &self.plan.sink)?;
+        let (mut prediction, laid) = if self.decision.contact && (linear.is_some() || self.is_strained(&question)) {
             self.solve(&question, linear.as_ref(), step.time_s - self.time_s, progress)?
         } else {
             self.settled = None;
@@ -51,7 +55,10 @@ impl Simulation<'_> {
                 (true, Some(0.0)) => "no force is applied",
                 (true, _) => "the needle does not reach the surface",
             };
-            (question.at_rest(self.decision.clone(), None, why), false)
+            if let Some(history) = &mut self.history {
+                history.grip = Grip::default();
+            }
+            (question.at_rest(self.decision.clone(), self.plan.sink.change_kpa, why), false)
         };
         self.remember_puncture(&mut prediction, step.time_s);
         // What is handed on is the guide's place, where a needle without a load would be.
@@ -74,6 +81,13 @@ impl Simulation<'_> {
         }
     }
 
+    /// Whether the tissue may be elsewhere than at rest though linear elasticity expects no contact.
+    fn is_strained(&self, question: &Question) -> bool {
+        let withdrawn = question.motion.force_mn == Some(0.0);
+        let kept = |history: &History| history.damage() > Some(0.0) || (history.grip.holds() && !withdrawn);
+        self.rates.any() || self.history.as_ref().is_some_and(kept)
+    }
+
     /// Whether the needle is held where the step before left it.
     fn unmoved(&self, question: &Question) -> bool {
         let needle = &question.request.needle;
@@ -90,7 +104,7 @@ impl Simulation<'_> {
         progress: &mut dyn Progress,
     ) -> Result<Aim, PredictError> {
         let contact = linear.map(|linear| question.estimate(linear, self.decision.tool_flex));
-        let remembers = self.rates.any();
+        let remembers = self.remembers();
         let fitting = |mesh: &ContactEstimate| contact.as_ref().is_none_or(|contact| fits(mesh, contact));
         let kept = self.laid.clone().filter(|laid| remembers || self.unmoved(question) || fitting(&laid.contact));
         let laid = match &kept {
@@ -103,8 +117,10 @@ impl Simulation<'_> {
                 };
                 if let (Level::Reference, Some(linear)) = (question.request.level, linear.filter(|_| !remembers)) {
                     // The finer mesh is made for the contact that `coarse` finds, as in a single prediction.
-                    let found =
-                        question.coarse(&COARSE, linear, &self.decision, None, &mut self.coarse, progress)?.estimate;
+                    let change_kpa = self.plan.sink.change_kpa;
+                    let found = question
+                        .coarse(&COARSE, linear, &self.decision, change_kpa, &mut self.coarse, progress)?
+                        .estimate;
                     around = ContactEstimate { center: found.center, radius_mm: found.radius_mm, ..around };
                 }
                 self.settled = None;
@@ -124,14 +140,15 @@ impl Simulation<'_> {
         step_s: f64,
         progress: &mut dyn Progress,
     ) -> Result<(Prediction, bool), PredictError> {
-        let problem = question.problem(&self.decision, None);
+        let problem = question.problem(&self.decision, self.plan.sink.change_kpa);
         let aim = self.aim(question, linear, &problem, progress)?;
         progress.stage("mesh");
         let topology = self.topology.clone();
         let wall = problem.wall(&topology, self.resolution, &aim.size)?;
-        if self.rates.any() && self.history.is_none() {
-            let tissue = &self.prepared.scene().tissue;
-            self.history = Some(History::at_rest(self.rates, tissue, &topology, &wall.geometry.rest));
+        let pressure = problem.pressure_kpa.map(|pressure_kpa| Pressure { pressure_kpa });
+        let pressing: Vec<Addition> = pressure.iter().map(|effect| Addition { effect, place: Place::Faces }).collect();
+        if self.remembers() && self.history.is_none() {
+            self.history = Some(self.begin(&wall, &pressing, progress)?);
         }
         let withdrawn = question.motion.force_mn == Some(0.0);
         let (motion, touch_mm) = match &aim.contact {
@@ -150,20 +167,18 @@ impl Simulation<'_> {
         wall.place_tip(&mut expected, &(motion.direction.into_inner() * motion.travel_mm + deflection));
         let start = self.start(&expected, &motion, self.unmoved(question));
         progress.stage("equilibrium");
-        let level = question.request.level.name();
-        let solver = &mut self.solver;
-        let solved = match &self.history {
-            Some(history) => history.with_additions(&wall, step_s, |additions| {
-                wall.solve(&Load { motion: &motion, touch_mm, additions }, start, solver, progress)
-            }),
-            None => wall.solve(&Load { motion: &motion, touch_mm, additions: &[] }, start, solver, progress),
-        };
-        let equilibrium = solved.map_err(|cause| PredictError::Solver { level, cause })?;
+        let coefficient = problem.friction_coefficient.filter(|_| !withdrawn);
+        let load = Load { motion: &motion, touch_mm, additions: &pressing };
+        let (equilibrium, rubbing, grip) = self.balance(&wall, &load, coefficient, step_s, start, progress)?;
         if let Some(history) = &mut self.history {
-            history.commit(&wall, &equilibrium.positions, step_s);
+            history.commit(&wall, &equilibrium.positions, grip, step_s);
         }
         progress.stage("surface");
         let mut answer = problem.answer(&wall, self.resolution, &equilibrium, touch_mm);
+        if let Some(rubbing) = &rubbing {
+            answer.contact.rub(rubbing);
+        }
+        answer.contact.bond_damage = self.history.as_ref().and_then(History::damage);
         if withdrawn {
             (answer.travel_mm, answer.deflection) = (0.0, None);
         } else {
@@ -179,6 +194,70 @@ impl Simulation<'_> {
         let mut prediction = question.prediction(answer, self.decision.clone(), expected_error);
         prediction.warnings.extend(aim.warnings);
         Ok((prediction, aim.laid))
+    }
+
+    /// Tissue that has been at rest for long, on the mesh of `wall`: under the pressure of the eye, if it has changed and anything depends on the rate at which the tissue leaves it.
+    fn begin(
+        &mut self,
+        wall: &Wall,
+        pressing: &[Addition],
+        progress: &mut dyn Progress,
+    ) -> Result<History, PredictError> {
+        let tissue = &self.prepared.scene().tissue;
+        let mut history = History::at_rest(self.rates, &self.decision, tissue, wall.topology(), &wall.geometry.rest);
+        if self.rates.any() && !pressing.is_empty() {
+            progress.stage("equilibrium");
+            let motion = Motion { direction: Vector3::z_axis(), force_mn: None, travel_mm: WITHDRAWN_MM };
+            let mut start = wall.start();
+            wall.place_tip(&mut start, &(motion.direction.into_inner() * WITHDRAWN_MM));
+            let bond = history.bond(f64::INFINITY);
+            let mut additions = pressing.to_vec();
+            additions.extend(bond.as_ref().map(|effect| Addition { effect, place: Place::Interface }));
+            let load = Load { motion: &motion, touch_mm: WITHDRAWN_MM, additions: &additions };
+            let settled = wall
+                .solve(&load, start, &mut self.solver, progress)
+                .map_err(|cause| PredictError::Solver { level: self.sequence.level.name(), cause })?;
+            history.settle(wall, &settled.positions);
+        }
+        Ok(history)
+    }
+
+    /// The equilibrium of a step of `step_s` (s), how it rubs, and the grip that it leaves.
+    fn balance(
+        &mut self,
+        wall: &Wall,
+        load: &Load,
+        coefficient: Option<f64>,
+        step_s: f64,
+        start: Vec<f64>,
+        progress: &mut dyn Progress,
+    ) -> Result<(Equilibrium, Option<Rubbing>, Grip), PredictError> {
+        let solver = &mut self.solver;
+        let free = Grip::default();
+        let grip = self.history.as_ref().map_or(&free, |history| &history.grip);
+        let rubs = self.decision.friction;
+        let solve = |additions: &[Addition]| {
+            let load = Load { additions, ..*load };
+            match coefficient {
+                Some(coefficient) => wall
+                    .solve_gripped(&load, coefficient, grip, start, solver, progress)
+                    .map(|(equilibrium, rubbing, grip)| (equilibrium, Some(rubbing), grip)),
+                None => {
+                    let found = wall.solve(&load, start, solver, progress)?;
+                    let left = if rubs { Grip::free(found.positions.clone()) } else { Grip::default() };
+                    Ok((found, None, left))
+                }
+            }
+        };
+        let found = match &self.history {
+            Some(history) => history.with_additions(wall, step_s, load.additions, solve),
+            None => solve(load.additions),
+        };
+        let level = self.sequence.level.name();
+        found.map_err(|cause| match cause {
+            FrictionError::Newton(cause) => PredictError::Solver { level, cause },
+            cause @ FrictionError::NotSettled { .. } => PredictError::Friction { level, cause },
+        })
     }
 
     /// Positions to start from.

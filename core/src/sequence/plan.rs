@@ -3,16 +3,15 @@
 //! Checking takes a fraction of a millisecond a step, so a sequence that cannot be is refused before it begins. Where a step leaves its
 //! needle's place to the step before, linear elasticity says where that is.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{Sequence, SequenceError, Step, TIME_STEP};
+use crate::effects::bleb;
 use crate::needle::{Body, Needle};
-use crate::predict::choice::Expected;
-use crate::predict::choice::adhesion::Pull;
-use crate::predict::choice::friction::Sliding;
+use crate::predict::choice::{Decision, Expected};
 use crate::predict::finite_element::ContactEstimate;
 use crate::predict::linear::LinearAnswer;
-use crate::predict::{Control, CutOrGrid, EffectReport, PredictError, PreparedScene, Question, Request};
+use crate::predict::{Control, CutOrGrid, EffectChoice, PredictError, PreparedScene, Question, Request, Sink};
 use crate::progress::Progress;
 use crate::range::ParameterRange;
 use crate::solve::newton::NewtonError;
@@ -21,10 +20,14 @@ use crate::solve::newton::NewtonError;
 pub(super) struct Plan {
     /// The contact of each step; `None` where the needle does not press.
     pub contacts: Vec<Option<ContactEstimate>>,
-    /// The deepest contact, and the largest bending of the shaft.
-    pub deepest: Expected,
-    /// What is decided of the eye's pressure.
-    pub pressure: EffectReport,
+    /// What was expected for that, the worst of all steps.
+    pub expected: Expected,
+    /// Whether the needle is held in the tissue in some step: what it presses with is then the tissue's to say.
+    pub is_held: bool,
+    /// What is decided of every effect but those of rate.
+    pub decision: Decision,
+    /// What the eye's pressure does by itself.
+    pub sink: Sink,
     /// The shortest time in which the load changes between two steps (s); infinite if it never does.
     pub fastest_change_s: f64,
 }
@@ -54,6 +57,12 @@ impl Plan {
         aim
     }
 
+    /// Whether one mesh resolves every contact as well as one of its own would.
+    pub fn is_one_contact(&self) -> bool {
+        let middle = self.middle();
+        self.contacts.iter().flatten().all(|contact| middle.as_ref().is_some_and(|(middle, _)| fits(middle, contact)))
+    }
+
     /// The contact to lay one mesh around for all steps: in the middle of all contacts, and as wide as all together. What the caller should know
     /// of such a mesh.
     pub fn middle(&self) -> Option<(ContactEstimate, Option<String>)> {
@@ -74,6 +83,53 @@ impl Plan {
             )
         });
         Some((ContactEstimate { radius_mm, ..middle }, warning))
+    }
+}
+
+/// What was worst so far of what decides about the effects.
+struct Worst {
+    /// The deepest contact with the largest slide, pull and bending of any.
+    expected: Expected,
+    /// The depth of that contact (mm).
+    depth_mm: f64,
+    /// How far the pressed needle has moved along the surface (mm).
+    along_mm: f64,
+    /// Contact centre (patch parameters) and orientation of the step before, if it pressed.
+    before: Option<([f64; 2], UnitQuaternion<f64>)>,
+}
+
+impl Worst {
+    /// Takes a step into account.
+    fn meet(&mut self, question: &Question, linear: Option<&LinearAnswer>, sink: &Sink) {
+        let bending = question.bending(linear);
+        let worst = &mut self.expected;
+        if bending.across_mn > worst.bending.across_mn {
+            worst.bending = bending;
+        }
+        let orientation = question.request.needle.orientation;
+        let Some(linear) = linear else {
+            self.before = None;
+            return;
+        };
+        if let Some((center, before)) = self.before {
+            let [x, y] = [0, 1].map(|k| linear.center[k] - center[k]);
+            // A needle that turns drags along what lies at the edge of its contact.
+            self.along_mm += x.hypot(y) + before.angle_to(&orientation) * linear.contact_radius_mm;
+        }
+        self.before = Some((linear.center, orientation));
+        let mut expected = question.expected(linear, sink);
+        expected.sliding.along_mm = self.along_mm;
+        let share = (self.along_mm / linear.depth_mm).min(expected.sliding.coefficient);
+        let share = share.max(expected.pull.tangential_share).max(worst.pull.tangential_share);
+        if linear.depth_mm > self.depth_mm {
+            self.depth_mm = linear.depth_mm;
+            let sliding = worst.sliding;
+            *worst = Expected { sliding, bending: worst.bending, ..expected };
+        }
+        worst.pull.tangential_share = share;
+        if expected.sliding.dragged_um() > worst.sliding.dragged_um() {
+            worst.sliding = expected.sliding;
+        }
     }
 }
 
@@ -133,11 +189,11 @@ impl Sequence {
 }
 
 /// The linear answer of a step; `None` where the needle does not press.
-pub(super) fn pressed<'b>(question: &'b Question) -> Result<Option<LinearAnswer<'b>>, PredictError> {
+pub(super) fn pressed<'b>(question: &'b Question, sink: &Sink) -> Result<Option<LinearAnswer<'b>>, PredictError> {
     if question.motion.force_mn == Some(0.0) {
         return Ok(None);
     }
-    question.pressed(&question.tool)
+    question.pressed(&question.raised(sink))
 }
 
 /// Checks every step, in the frame of the patch under the first that loads.
@@ -159,25 +215,13 @@ pub(super) fn plan<'a>(
     };
     sequence.needle.validate().map_err(|error| at(0, error.into()))?;
     let patch = prepared.patch_for(&sequence.request(first, &sequence.needle), body).map_err(|cause| at(0, cause))?;
-    let sliding = Sliding { coefficient: prepared.scene().friction_coefficient, depth_mm: 0.0, tangent: 0.0 };
-    let tissue = &prepared.scene().tissue;
-    let pull = Pull {
-        normal_force_mn: 0.0,
-        tangential_share: 0.0,
-        depth_mm: tissue.retina_thickness_mm(),
-        suction_kpa: 0.0,
-        strength_kpa: tissue.bond.strength_kpa,
-    };
     let request = sequence.request(first, &sequence.needle);
-    let question = Question::new(prepared, &request, body, CutOrGrid::Grid(patch.patch()));
-    let (limits, pressure) = (question.puncture_limits(), question.sink().report);
-    let bending = question.bending(None);
-    let mut plan = Plan {
-        contacts: Vec::with_capacity(sequence.steps.len()),
-        deepest: Expected { depth_mm: 0.0, strain: 0.0, sliding, pull, bending, limits },
-        pressure,
-        fastest_change_s: f64::INFINITY,
-    };
+    let first = Question::new(prepared, &request, body, CutOrGrid::Grid(patch.patch()));
+    let sink = first.sink_without_fluid();
+    let mut worst = Worst { expected: first.unpressed(&sink), depth_mm: 0.0, along_mm: 0.0, before: None };
+    let mut contacts = Vec::with_capacity(sequence.steps.len());
+    let mut fastest_change_s = f64::INFINITY;
+    let mut is_held = false;
     let mut needle = sequence.needle;
     let (mut before_s, mut load_before) = (0.0, None);
     for (index, step) in sequence.steps.iter().enumerate() {
@@ -188,31 +232,41 @@ pub(super) fn plan<'a>(
         let request = sequence.request(step, &needle);
         request.needle.validate().map_err(|error| at(index, error.into()))?;
         let question = Question::new(prepared, &request, body, CutOrGrid::Grid(patch.patch()));
-        let linear = pressed(&question).map_err(|cause| at(index, cause))?;
+        let linear = pressed(&question, &sink).map_err(|cause| at(index, cause))?;
         needle = request.needle;
-        if let Some(linear) = &linear {
-            if step.force_mn.is_some() {
-                let direction = patch.patch().scene_from_patch * question.motion.direction.into_inner();
-                needle.tip_mm += direction * linear.travel_mm();
-            }
-            if linear.depth_mm > plan.deepest.depth_mm {
-                let strain = linear.depth_mm / question.yielding_mm();
-                let sliding = Sliding { depth_mm: linear.depth_mm, tangent: linear.press.tangent(), ..sliding };
-                let pull = Pull { normal_force_mn: linear.normal_force_mn, ..pull };
-                let bending = plan.deepest.bending;
-                plan.deepest = Expected { depth_mm: linear.depth_mm, strain, sliding, pull, bending, limits };
-            }
+        if let (Some(linear), Some(_)) = (&linear, step.force_mn) {
+            let direction = patch.patch().scene_from_patch * question.motion.direction.into_inner();
+            needle.tip_mm += direction * linear.travel_mm();
         }
-        let bending = question.bending(linear.as_ref());
-        if bending.across_mn > plan.deepest.bending.across_mn {
-            plan.deepest.bending = bending;
-        }
+        is_held |= step.force_mn.is_none() && linear.is_some();
+        worst.meet(&question, linear.as_ref(), &sink);
         let load = linear.as_ref().map(|linear| (linear.depth_mm, linear.center));
         if load != load_before {
-            plan.fastest_change_s = plan.fastest_change_s.min(step.time_s - before_s);
+            fastest_change_s = fastest_change_s.min(step.time_s - before_s);
         }
         (before_s, load_before) = (step.time_s, load);
-        plan.contacts.push(linear.as_ref().map(|linear| question.estimate(linear, false)));
+        contacts.push(linear.as_ref().map(|linear| question.estimate(linear, false)));
     }
-    Ok((patch, plan))
+    let mut decision = first.decide(worst.expected, &sink).map_err(|cause| at(0, cause))?;
+    leave_fluid_out(sequence, &mut decision).map_err(|cause| at(0, cause))?;
+    drop(first);
+    Ok((patch, Plan { contacts, expected: worst.expected, is_held, decision, sink, fastest_change_s }))
+}
+
+/// A sequence has no fluid under the retina: it says so, and refuses what names it.
+///
+/// # Errors
+/// [`PredictError::Effect`] where the effect is named.
+fn leave_fluid_out(sequence: &Sequence, decision: &mut Decision) -> Result<(), PredictError> {
+    if matches!(&sequence.effects, EffectChoice::Named(names) if names.iter().any(|name| name == bleb::NAME)) {
+        let problem = "is not simulated in a sequence".to_owned();
+        return Err(PredictError::Effect { name: bleb::NAME.to_owned(), problem });
+    }
+    if decision.bleb {
+        let told = decision.reports.iter().find(|report| report.name == bleb::NAME);
+        let reason = told.map_or_else(String::new, |report| format!("{}; not simulated in a sequence", report.reason));
+        decision.without(&[bleb::NAME], &reason);
+        decision.bleb = false;
+    }
+    Ok(())
 }

@@ -10,9 +10,10 @@ use std::f64::consts::PI;
 use super::Sequence;
 use super::plan::Plan;
 use crate::effects::viscoelasticity::Network;
-use crate::effects::{adhesion, bleb, friction, inertia, pressure, viscoelasticity};
-use crate::predict::choice::{Decision, decide as decide_static};
-use crate::predict::{EffectChoice, EffectReport, PredictError, PreparedScene};
+use crate::effects::{inertia, viscoelasticity};
+use crate::predict::choice::Decision;
+use crate::predict::choice::adhesion::{Pull, report as report_adhesion};
+use crate::predict::{EffectChoice, EffectReport, PreparedScene};
 use crate::tissue::{LayerKind, Tissue};
 
 /// Share of the elastic stress or displacement below which `auto` leaves an effect of rate out: the relative error that `reference` itself has.
@@ -50,33 +51,10 @@ pub(super) fn slowest_period_s(tissue: &Tissue) -> f64 {
     4.0 * crossing_s
 }
 
-/// Effects of single equilibria that a sequence leaves out, and says so.
-const STATIC_ONLY: [&str; 4] = [friction::NAME, pressure::NAME, adhesion::NAME, bleb::NAME];
-
-/// Decides for the whole sequence.
-///
-/// # Errors
-/// [`PredictError::Effect`], as for a single request.
-pub(super) fn decide(
-    prepared: &PreparedScene,
-    sequence: &Sequence,
-    plan: &Plan,
-) -> Result<(Decision, Rates), PredictError> {
+/// Adds to what the plan decided of the whole sequence what depends on its times.
+pub(super) fn decide(prepared: &PreparedScene, sequence: &Sequence, plan: &Plan) -> (Decision, Rates) {
     let tissue = &prepared.scene().tissue;
-    if let EffectChoice::Named(names) = &sequence.effects
-        && let Some(name) = names.iter().find(|name| STATIC_ONLY.contains(&name.as_str()))
-    {
-        return Err(PredictError::Effect { name: name.clone(), problem: "is not simulated in a sequence".to_owned() });
-    }
-    let mut decision = decide_static(&sequence.effects, sequence.level, plan.deepest, &plan.pressure)?;
-    decision.friction = false;
-    decision.adhesion = false;
-    decision = decision.with_bleb(prepared.lifting(&sequence.effects, sequence.level));
-    decision.bleb = false;
-    for report in decision.reports.iter_mut().filter(|report| STATIC_ONLY.contains(&report.name) && report.simulated) {
-        report.simulated = false;
-        report.reason += "; not simulated in a sequence";
-    }
+    let mut decision = plan.decision.clone();
     let change_s = plan.fastest_change_s;
     let networks = networks(tissue);
     let borne: f64 = networks.iter().map(|network| network.borne(change_s)).sum();
@@ -115,5 +93,14 @@ pub(super) fn decide(
         viscoelasticity: judge(viscoelasticity::NAME, borne, relaxation) && !networks.is_empty(),
         inertia: judge(inertia::NAME, overshoot, vibration),
     };
-    Ok((decision, rates))
+    if rates.viscoelasticity && plan.is_held {
+        // A needle that is moved fast presses the stiffer tissue with more.
+        let pull = Pull { normal_force_mn: plan.expected.pull.normal_force_mn * (1.0 + borne), ..plan.expected.pull };
+        let report = report_adhesion(&sequence.effects, sequence.level, decision.contact, &pull);
+        decision.adhesion = report.simulated;
+        if let Some(place) = decision.reports.iter_mut().find(|place| place.name == report.name) {
+            *place = report;
+        }
+    }
+    (decision, rates)
 }

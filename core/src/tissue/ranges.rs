@@ -150,3 +150,23 @@ pub const FRACTURE_ENERGY: ParameterRange = ParameterRange {
     source: "in vivo, bleb and Laplace's law: rabbit 0.10, monkey 0.14, cat 0.18 N/m (Kita & Marmor 1992); twice that at 180 degrees, 1.5 times \
              under mannitol; the bounds are this program's. A porcine peel test gave 11 N/m (Zhang 2023), more than the retina itself bears",
 };
+
+/// Power with which strength and fracture energy of the bond grow with the speed of its opening.
+pub const BOND_RATE_EXPONENT: ParameterRange = ParameterRange {
+    name: "rate exponent of the retina's bond",
+    unit: "1",
+    default: 0.0,
+    min: 0.0,
+    max: 0.6,
+    source: "[unverified] no dependence of the retina's bond on speed was found, hence 0; the upper bound is that of rubber peeled off glass (Maugis & Barquins 1978)",
+};
+
+/// Speed of opening from about which on the bond holds more.
+pub const BOND_REFERENCE_SPEED: ParameterRange = ParameterRange {
+    name: "reference speed of the retina's bond",
+    unit: "mm/s",
+    default: 0.01,
+    min: 1e-6,
+    max: 100.0,
+    source: "[unverified] nothing published: the length of the epithelium's villi, 0.007 mm, in about a second. Bounds of this program",
+};

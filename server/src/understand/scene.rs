@@ -212,6 +212,8 @@ fn bond(spec: &BondSpec) -> RetinalBond {
     RetinalBond {
         strength_kpa: spec.strength_kpa.unwrap_or(default.strength_kpa),
         fracture_energy_mn_per_mm: spec.fracture_energy_mn_per_mm.unwrap_or(default.fracture_energy_mn_per_mm),
+        rate_exponent: spec.rate_exponent.unwrap_or(default.rate_exponent),
+        reference_speed_mm_per_s: spec.reference_speed_mm_per_s.unwrap_or(default.reference_speed_mm_per_s),
     }
 }
 

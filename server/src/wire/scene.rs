@@ -170,6 +170,12 @@ pub struct BondSpec {
     /// Energy that letting go costs, mN/mm (the same number in N/m), 0.06 to 0.6; 0.14 when left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fracture_energy_mn_per_mm: Option<f64>,
+    /// Power with which both grow with the speed of opening, 0 to 0.6; 0 (they do not) when left out. Read by `POST /v1/simulate` alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_exponent: Option<f64>,
+    /// Speed of opening from about which on they grow, mm/s, 1e-6 to 100; 0.01 when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference_speed_mm_per_s: Option<f64>,
 }
 
 /// What of the tissue depends on time; a number left out is its default.

@@ -51,7 +51,8 @@ pub struct SimulateRequest {
 pub struct StepSpec {
     /// When the step's load is reached, s: 1e-6 to 1000 after the step before, or after 0.
     pub time_s: f64,
-    /// Foremost point of the needle before it moves, scene frame, mm.
+    /// Foremost point of the needle before it moves, scene frame, mm. Where friction is simulated, a needle that presses is dragged there straight along the tissue; a step
+    /// of zero force before lifts it.
     pub tip_mm: Option<Vector>,
     /// Rotation from the needle's frame to the scene's, as x, y, z, w. Not together with `direction`.
     pub orientation_xyzw: Option<Quaternion>,

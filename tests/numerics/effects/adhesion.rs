@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use retina_core::effect::{Effect, Local, Stencils};
+use retina_core::effects::adhesion::rate::Opened;
 use retina_core::effects::adhesion::{Adhesion, Bond, GROUP, Interface};
 use retina_core::mesh::element::FACE_NODES;
 use retina_tests::tolerance::ROUNDOFF;
@@ -60,14 +61,23 @@ pub fn check() {
             for seed in 0..REPEATS as u64 {
                 let (interface, current) = parted(size, apart, 0.05, seed);
                 let largest_mm = vec![past * bond(size).onset_mm(); interface.points()];
-                let effect = Adhesion { interface: &interface, bond: bond(size), largest_mm: &largest_mm };
+                let effect =
+                    Adhesion { interface: &interface, bond: bond(size), largest_mm: &largest_mm, opened: None };
                 let case = Case {
                     label: format!("{label}, seed {seed}, size {size:e}"),
                     group: 0,
                     current,
                     step_mm: 0.01 * STEP * RADIUS * size,
                 };
-                check_effect("adhesion", &effect, &[case]);
+                check_effect("adhesion", &effect, std::slice::from_ref(&case));
+                // The same openings, reached in haste from half of them.
+                let local = Local { current: &case.current, group: 0, predicted: &[] };
+                let start_mm: Vec<f64> = effect.present(&local).map(|present| 0.5 * present).collect();
+                for reference in [1e-3, 1.0, 1e6] {
+                    let reference_mm = reference * bond(size).onset_mm();
+                    let opened = Some(Opened { exponent: 0.4, reference_mm, start_mm: &start_mm });
+                    check_effect("adhesion", &Adhesion { opened, ..effect }, std::slice::from_ref(&case));
+                }
             }
         }
     }
@@ -96,7 +106,7 @@ fn letting_go_costs_the_fracture_energy_and_gives_nothing_back() {
         let mut returned = f64::NAN;
         for i in 0..=steps {
             let (_, current) = parted(1.0, direction * way(i), 0.0, 0);
-            let effect = Adhesion { interface: &interface, bond, largest_mm: &largest_mm };
+            let effect = Adhesion { interface: &interface, bond, largest_mm: &largest_mm, opened: None };
             let local = Local { current: &current, group: 0, predicted: &[] };
             let forces = added(3 * GROUP, |out| effect.add_gradient(&local, out));
             let on = |from: usize| -> Vector3<f64> {
@@ -122,5 +132,43 @@ fn letting_go_costs_the_fracture_energy_and_gives_nothing_back() {
         assert!(returned > 0.3 * cost && returned < cost, "a cycle keeps what it took: {returned}");
         assert!(largest_mm.iter().all(|&largest| bond.damage(largest) == 1.0), "parted for good");
         assert_eq!(bond.damage(0.5 * bond.onset_mm()), 0.0);
+    }
+}
+
+#[test]
+fn a_hasty_opening_costs_more_by_the_power_of_its_speed() {
+    let bond = bond(1.0);
+    let (n, start) = (0.3, [0.0]);
+    // Torn open at constant speed in one step, or in many: the bond has borne the same, times (1 + v/v₀)ⁿ.
+    for haste in [1e-9, 1e-3, 1.0, 1e3] {
+        let parted = bond.parted_mm();
+        let torn = |steps: usize| -> f64 {
+            let width = parted / steps as f64;
+            let traction = |k: usize| {
+                let start = [width * k as f64];
+                let opened = Opened { exponent: n, reference_mm: width / haste, start_mm: &start };
+                opened.potential(&bond, start[0] + width, start[0], 0).1
+            };
+            (0..steps).map(traction).sum::<f64>() * width
+        };
+        let exact = bond.fracture_energy_mn_per_mm * (1.0 + haste).powf(n);
+        println!(
+            "haste {haste:e}: work in 200 steps {:.5}, in 2000 {:.5} of the closed form",
+            torn(200) / exact,
+            torn(2000) / exact
+        );
+        assert!((torn(2000) / exact - 1.0).abs() < 1e-3, "{} for {exact}", torn(2000));
+    }
+    // What closes, and what has no power, is the bond without haste, to the last bit.
+    fn opened(exponent: f64, start_mm: &[f64]) -> Opened<'_> {
+        Opened { exponent, reference_mm: 1e-6, start_mm }
+    }
+    for o in [0.3, 1.5, 4.0].map(|onsets| onsets * bond.onset_mm()) {
+        let closing = [2.0 * o];
+        assert_eq!(opened(n, &closing).potential(&bond, o, closing[0], 0), bond.potential(o, closing[0]));
+        let slow = opened(0.0, &start).potential(&bond, o, 0.0, 0);
+        let (energy, traction, slope) = bond.potential(o, 0.0);
+        assert!((slow.0 / energy - 1.0).abs() < ROUNDOFF && (slow.1, slow.2) == (traction, slope));
+        assert!(opened(n, &start).potential(&bond, o, 0.0, 0).1 > traction, "the paired negative: haste is felt");
     }
 }

@@ -82,7 +82,7 @@ impl Plate {
         let count = interface.points() * self.topology.interface.len();
         let bond = Bond { strength_kpa: 1.0, fracture_energy_mn_per_mm: 0.1, stiffness_kpa_per_mm: 1e5 };
         let apart = vec![2.0 * bond.parted_mm(); count];
-        let adhesion = Adhesion { interface: &interface, bond, largest_mm: &apart };
+        let adhesion = Adhesion { interface: &interface, bond, largest_mm: &apart, opened: None };
         let first_kpa = self.pressure_kpa(volume_mm3);
         let holds = match fixed_kpa {
             Some(pressure_kpa) => Holds::Pressure(pressure_kpa),
@@ -258,7 +258,7 @@ fn a_line_search_finds_the_pressure_that_full_steps_find() {
     let interface = Interface::new(&plate.topology.interface, &wall.geometry.rest);
     let bond = Bond { strength_kpa: 1.0, fracture_energy_mn_per_mm: 0.1, stiffness_kpa_per_mm: 1e5 };
     let apart = vec![2.0 * bond.parted_mm(); interface.points() * plate.topology.interface.len()];
-    let adhesion = Adhesion { interface: &interface, bond, largest_mm: &apart };
+    let adhesion = Adhesion { interface: &interface, bond, largest_mm: &apart, opened: None };
     let volume_mm3 = 0.05;
     let found = |globalization: Globalization, wanted_mm3: f64| {
         let first_kpa = plate.pressure_kpa(wanted_mm3);
@@ -278,7 +278,6 @@ fn a_line_search_finds_the_pressure_that_full_steps_find() {
             tolerance_mn: 1e-9,
             max_iterations: 60,
             max_travel_mm: 1.0,
-            held_iterations: 0,
         };
         let mut positions = wall.start();
         let mut workspace = Workspace::new(pattern, symbolic);

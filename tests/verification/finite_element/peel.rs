@@ -71,7 +71,7 @@ fn peel_force(fracture_energy: f64) -> f64 {
         for v in (0..film).filter(|&v| pulled(v)) {
             positions[3 * v + 2] += lift_mm;
         }
-        let adhesion = Adhesion { interface: &bonded, bond, largest_mm: &largest_mm };
+        let adhesion = Adhesion { interface: &bonded, bond, largest_mm: &largest_mm, opened: None };
         let terms = [
             Term { effect: &solid, stencils: &mesh.elements, set: 0 },
             Term { effect: &adhesion as &dyn Effect, stencils: &interface, set: 1 },

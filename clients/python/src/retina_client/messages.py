@@ -203,6 +203,12 @@ class BondSpec(TypedDict, total=False):
     """How the retina holds on to the pigment epithelium under it; a number left out is the default."""
     fracture_energy_mn_per_mm: Optional[float]
     """Energy that letting go costs, mN/mm (the same number in N/m), 0.06 to 0.6; 0.14 when left out."""
+    rate_exponent: Optional[float]
+    """Power with which both grow with the speed of opening, 0 to 0.6; 0 (they do not) when left out. Read by `POST
+    /v1/simulate` alone.
+    """
+    reference_speed_mm_per_s: Optional[float]
+    """Speed of opening from about which on they grow, mm/s, 1e-6 to 100; 0.01 when left out."""
     strength_kpa: Optional[float]
     """Largest traction, kPa, 1 to 100; 40 when left out."""
 

@@ -3,6 +3,8 @@
 //! Without friction the needle slides along the surface by its travel's part along it, depth × tan(angle between motion and normal). Friction
 //! drags the surface along, at most that far, and with no more than µ times the normal force; a layer yields about as easily along its surface as across it, so by no more
 //! than µ × depth. The smaller of the two moves the surface sideways; and because friction then carries part of a leaning force, it changes the depth too, by that times the tangent.
+//!
+//! In a sequence the pressed needle also moves along the surface from step to step, and drags it as far, with no more than µ × depth again.
 
 use super::super::types::{EffectChoice, EffectReport, Level};
 use super::AUTO_TOLERANCE_UM;
@@ -22,6 +24,8 @@ pub struct Sliding {
     pub depth_mm: f64,
     /// Tangent of the angle between the motion and the inward normal.
     pub tangent: f64,
+    /// How far the pressed needle has moved along the surface in the steps of a sequence (mm); 0 in a single prediction.
+    pub along_mm: f64,
 }
 
 impl Sliding {
@@ -29,7 +33,8 @@ impl Sliding {
     pub fn dragged_um(&self) -> f64 {
         let leaning = self.coefficient.min(self.tangent) * (1.0 + self.tangent);
         let spreading = SPREAD * self.coefficient.min(1.0);
-        (leaning + spreading) * self.depth_mm * 1e3
+        let along_mm = self.along_mm.min(self.coefficient * self.depth_mm);
+        ((leaning + spreading) * self.depth_mm + along_mm) * 1e3
     }
 }
 

@@ -1,0 +1,172 @@
+//! The small system of the tail: its energies as they are, the tissue below as a spring.
+
+use faer::prelude::Solve;
+use faer::{Mat, MatRef, Side};
+use nalgebra::Vector3;
+
+use super::super::border::{Drive, Reduced};
+use super::super::newton::{System, Workspace};
+use super::super::sparse::norm;
+use crate::assemble::tail::{Stresses, Tail};
+
+/// Iterations on the condensed system at most: each costs a small part of one on the whole.
+const MAX_ITERATIONS: usize = 20;
+/// Halvings of one of its steps: a needle that has lost touch moves as far as it may, and a stiff contact answers within a micrometre.
+const MAX_HALVINGS: usize = 16;
+/// Residual over the first one at which it is solved: the tissue's own change is more than what is left.
+const REDUCTION: f64 = 0.05;
+/// The condensed problem at one state of the whole.
+pub(super) struct Model<'a> {
+    /// The whole.
+    pub system: &'a System<'a>,
+    /// What acts on the tail.
+    pub tail: Tail<'a>,
+    /// The tissue's condensed force f (mN).
+    pub force: &'a [f64],
+    /// Its condensed stiffness K (mN/mm).
+    pub tissue: &'a Mat<f64>,
+    /// How the driven vertex moves.
+    pub drive: Drive,
+    /// The state of the whole.
+    pub origin: &'a [f64],
+}
+
+/// Unknowns of the condensed problem and what is out of balance there.
+struct State {
+    /// Tail, then border (mm).
+    unknowns: Vec<f64>,
+    /// Residual on the tail (mN).
+    residual: Vec<f64>,
+    /// Along each direction of the drive (mN).
+    out_of_balance: Vec<f64>,
+    /// Norm of both.
+    left: f64,
+}
+
+impl Model<'_> {
+    /// The unknowns (tail, then border) at which the model is in balance, from `start`; `None` if nothing better than the start was found.
+    pub fn solve(
+        &self,
+        start: &[f64],
+        max_travel_mm: f64,
+        hessian: &mut Vec<f64>,
+        workspace: &mut Workspace,
+    ) -> Option<Vec<f64>> {
+        let newton = self.state(start.to_vec(), workspace);
+        let still = self.state(vec![0.0; start.len()], workspace);
+        let first = newton.left;
+        let solved = REDUCTION * first.min(still.left);
+        // A needle that has lost touch moves as far as it may in a Newton step.
+        let mut at = if still.left < first { still } else { newton };
+        for _ in 0..MAX_ITERATIONS {
+            if at.left <= solved {
+                break;
+            }
+            let Some(step) = self.step(&at, max_travel_mm, hessian, workspace) else { break };
+            let Some(next) = self.descend(&at, &step, max_travel_mm, workspace) else { break };
+            at = next;
+        }
+        (at.left < first).then_some(at.unknowns)
+    }
+
+    /// Newton's step from `at`; `None` if there is none.
+    fn step(
+        &self,
+        at: &State,
+        max_travel_mm: f64,
+        hessian: &mut Vec<f64>,
+        workspace: &mut Workspace,
+    ) -> Option<Vec<f64>> {
+        let size = self.force.len();
+        let stride = size + 3;
+        let positions = self.positions(&at.unknowns);
+        // Stresses far above those in balance turn the Hessian over; without them it is as definite as the tissue.
+        let factor = [Stresses::Current, Stresses::None].into_iter().find_map(|stresses| {
+            self.tail.hessian(&positions, stresses, &mut workspace.scratch, hessian);
+            let entry = |i: usize, j: usize| if i >= j { self.tissue[(i, j)] + hessian[i * stride + j] } else { 0.0 };
+            Mat::from_fn(size, size, entry).llt(Side::Lower).ok()
+        })?;
+        let directions: Vec<Vector3<f64>> =
+            self.drive.directions().into_iter().map(|(direction, _)| direction).collect();
+        let coupling =
+            |i: usize, direction: &Vector3<f64>| (0..3).map(|k| hessian[(size + k) * stride + i] * direction[k]).sum();
+        let couplings = Mat::from_fn(size, 1 + directions.len(), |i, d| {
+            if d == 0 { -at.residual[i] } else { coupling(i, &directions[d - 1]) }
+        });
+        let columns = factor.solve(&couplings);
+        let dot = |a: usize, b: usize| (0..size).map(|i| couplings[(i, a)] * columns[(i, b)]).sum::<f64>();
+        let mut reduced = Reduced { directions: &directions, stiffness: Vec::new(), drive: Vec::new() };
+        for (row, along) in directions.iter().enumerate() {
+            for (column, other) in directions.iter().enumerate() {
+                let own: f64 = (0..3)
+                    .flat_map(|i| (0..3).map(move |j| (i, j)))
+                    .map(|(i, j)| along[i] * other[j] * hessian[(size + i.max(j)) * stride + size + i.min(j)])
+                    .sum();
+                reduced.stiffness.push(own - dot(1 + row, 1 + column));
+            }
+            reduced.drive.push(-at.out_of_balance[row] - dot(1 + row, 0));
+        }
+        let travels = reduced.solve(max_travel_mm);
+        let mut step: Vec<f64> = (0..size).map(|i| columns[(i, 0)]).collect();
+        for (d, travel) in travels.iter().enumerate() {
+            step.iter_mut().enumerate().for_each(|(i, s)| *s -= travel * columns[(i, 1 + d)]);
+        }
+        let moved: Vector3<f64> = directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
+        step.extend(moved.iter());
+        Some(step)
+    }
+
+    /// The first of the halves of `step` that brings the residual down or does not raise the potential.
+    fn descend(&self, at: &State, step: &[f64], max_travel_mm: f64, workspace: &mut Workspace) -> Option<State> {
+        let size = self.force.len();
+        let mut bound = None;
+        for halvings in 0..=MAX_HALVINGS {
+            let scale = 0.5_f64.powi(halvings as i32);
+            let next: Vec<f64> = at.unknowns.iter().zip(step).map(|(a, s)| a + scale * s).collect();
+            if norm(&next[size..]) > max_travel_mm {
+                continue;
+            }
+            let next = self.state(next, workspace);
+            if next.left < at.left {
+                return Some(next);
+            }
+            let bound = *bound.get_or_insert_with(|| self.potential(&at.unknowns, workspace));
+            if self.potential(&next.unknowns, workspace) < bound {
+                return Some(next);
+            }
+        }
+        None
+    }
+
+    fn positions(&self, at: &[f64]) -> Vec<f64> {
+        let mut positions = self.origin.to_vec();
+        self.system.dofs.advance_tail(&mut positions, at);
+        positions
+    }
+
+    fn state(&self, unknowns: Vec<f64>, workspace: &mut Workspace) -> State {
+        let size = self.force.len();
+        let gradient = self.tail.gradient(&self.positions(&unknowns), &mut workspace.scratch);
+        let mut residual = times(self.tissue, &unknowns[..size]);
+        for (i, r) in residual.iter_mut().enumerate() {
+            *r += self.force[i] + gradient[i];
+        }
+        let out_of_balance = self.drive.out_of_balance(&Vector3::from_row_slice(&gradient[size..]));
+        let left = out_of_balance.iter().fold(norm(&residual), |sum, a| sum.hypot(*a));
+        State { unknowns, residual, out_of_balance, left }
+    }
+
+    fn potential(&self, at: &[f64], workspace: &mut Workspace) -> f64 {
+        let size = self.force.len();
+        let own = self.tail.energy(&self.positions(at), &mut workspace.scratch);
+        let stretched = times(self.tissue, &at[..size]);
+        let tissue: f64 = (0..size).map(|i| at[i] * (self.force[i] + 0.5 * stretched[i])).sum();
+        own + tissue - self.drive.work(&Vector3::from_row_slice(&at[size..]))
+    }
+}
+
+/// Matrix times vector.
+pub(super) fn times(matrix: &Mat<f64>, vector: &[f64]) -> Vec<f64> {
+    let product = matrix * MatRef::from_column_major_slice(vector, vector.len(), 1);
+    (0..vector.len()).map(|i| product[(i, 0)]).collect()
+}
