@@ -1,8 +1,9 @@
-//! Linear and nonlinear solution: the sparse Cholesky factorisation (the one place that names faer's sparse code) and Newton's
-//! method on top of it.
+//! Linear and nonlinear solution: the sparse and the dense Cholesky factorisation (the two places that name faer) and Newton's
+//! method on top of them.
 
 mod border;
 mod condensed;
+mod dense;
 pub mod globalization;
 mod held;
 pub mod newton;

@@ -28,9 +28,9 @@ fn sublayers(tissue: &mut Tissue, moduli: &[f64]) {
 }
 
 const CASES: &[Case] = &[
-    case("ν 0 everywhere", || tissue(|t| every_ratio(t, 0.0)), || push(BALL, 0.5), Answer(9)),
-    case("ν 0.4999 in the retina", || tissue(|t| t.retina[0].poisson_ratio = 0.4999), || push(BALL, 1.0), Answer(8)),
-    case("ν 0.4999 everywhere", || tissue(|t| every_ratio(t, 0.4999)), || push(BALL, 1.0), Answer(8)),
+    case("ν 0 everywhere", || tissue(|t| every_ratio(t, 0.0)), || push(BALL, 0.5), Answer(3)),
+    case("ν 0.4999 in the retina", || tissue(|t| t.retina[0].poisson_ratio = 0.4999), || push(BALL, 1.0), Answer(7)),
+    case("ν 0.4999 everywhere", || tissue(|t| every_ratio(t, 0.4999)), || push(BALL, 1.0), Answer(6)),
     case(
         "ν 0.49999: the range ends",
         || tissue(|t| t.retina[0].poisson_ratio = 0.49999),
@@ -43,43 +43,38 @@ const CASES: &[Case] = &[
         || all(lean(BALL, 30.0, 40.0, 0.8)),
         Answer(9),
     ),
-    case("stiffness 1 on 20", || tissue(|t| moduli(t, 1.0, 20.0, 500.0)), || push(BALL, 0.08), Answer(12)),
-    case("stiffness 1 on 200", || tissue(|t| moduli(t, 1.0, 200.0, 2000.0)), || push(BALL, 0.08), Answer(10)),
+    case("stiffness 1 on 20", || tissue(|t| moduli(t, 1.0, 20.0, 500.0)), || push(BALL, 0.08), Answer(5)),
+    case("stiffness 1 on 200", || tissue(|t| moduli(t, 1.0, 200.0, 2000.0)), || push(BALL, 0.08), Answer(5)),
     case(
         "stiffness 0.9 on 1300 (1444 times)",
         || tissue(|t| moduli(t, 0.9, 1300.0, 1800.0)),
         || push(BALL, 0.08),
-        Answer(9),
+        Answer(5),
     ),
-    case("stiffness 0.9, 1, 2000", || tissue(|t| moduli(t, 0.9, 1.0, 2000.0)), || push(BALL, 0.05), Answer(10)),
-    case("stiffness 30 on 1 on 5000", || tissue(|t| moduli(t, 30.0, 1.0, 5000.0)), || push(BALL, 0.5), Answer(9)),
-    case("stiff sublayer on soft, 33 times", || tissue(|t| sublayers(t, &[30.0, 0.9])), || push(BALL, 0.05), Answer(8)),
-    case(
-        "soft sublayer on stiff, 33 times",
-        || tissue(|t| sublayers(t, &[0.9, 30.0])),
-        || push(BALL, 0.05),
-        Answer(13),
-    ),
+    case("stiffness 0.9, 1, 2000", || tissue(|t| moduli(t, 0.9, 1.0, 2000.0)), || push(BALL, 0.05), Answer(5)),
+    case("stiffness 30 on 1 on 5000", || tissue(|t| moduli(t, 30.0, 1.0, 5000.0)), || push(BALL, 0.5), Answer(5)),
+    case("stiff sublayer on soft, 33 times", || tissue(|t| sublayers(t, &[30.0, 0.9])), || push(BALL, 0.05), Answer(4)),
+    case("soft sublayer on stiff, 33 times", || tissue(|t| sublayers(t, &[0.9, 30.0])), || push(BALL, 0.05), Answer(5)),
     case(
         "eight sublayers in turn soft and stiff",
         || tissue(|t| sublayers(t, &[0.9, 30.0, 0.9, 30.0, 0.9, 30.0, 0.9, 30.0])),
         || push(BALL, 0.05),
-        Answer(12),
+        Answer(5),
     ),
     case(
         "membrane 1 µm, 1000 times the retina",
         || tissue(|t| membrane(t, 0.001, 20_000.0)),
         || push(BALL, 0.5),
-        Answer(9),
+        Answer(6),
     ),
     case(
         "membrane 1 µm, 1000 times, light touch",
         || tissue(|t| membrane(t, 0.001, 20_000.0)),
         || push(BALL, 0.02),
-        Answer(16),
+        Answer(20),
     ),
-    case("membrane 70 nm, 10 times", || tissue(|t| membrane(t, 7e-5, 200.0)), || push(BALL, 0.5), Answer(8)),
-    case("membrane 4 µm, 1000 times", || tissue(|t| membrane(t, 0.004, 20_000.0)), || push(BALL, 0.5), Answer(10)),
+    case("membrane 70 nm, 10 times", || tissue(|t| membrane(t, 7e-5, 200.0)), || push(BALL, 0.5), Answer(5)),
+    case("membrane 4 µm, 1000 times", || tissue(|t| membrane(t, 0.004, 20_000.0)), || push(BALL, 0.5), Answer(8)),
     case(
         "membrane 1 µm, 20 000 times",
         || {
@@ -89,9 +84,9 @@ const CASES: &[Case] = &[
             })
         },
         || push(BALL, 0.05),
-        Answer(13),
+        Answer(10),
     ),
-    case("retina of 80 µm", || tissue(|t| t.retina[0].thickness_mm = 0.08), || push(BALL, 0.5), Answer(8)),
+    case("retina of 80 µm", || tissue(|t| t.retina[0].thickness_mm = 0.08), || push(BALL, 0.5), Answer(4)),
     case(
         "retina of 80 µm on choroid of 50 µm",
         || {
@@ -101,7 +96,7 @@ const CASES: &[Case] = &[
             })
         },
         || push(BALL, 0.5),
-        Answer(9),
+        Answer(5),
     ),
     case(
         "retina of 320 µm on choroid of 500 µm",
@@ -112,7 +107,7 @@ const CASES: &[Case] = &[
             })
         },
         || push(BALL, 0.5),
-        Answer(8),
+        Answer(4),
     ),
     case(
         "retina of 79 µm: the range ends",

@@ -210,8 +210,7 @@ impl Problem<'_> {
         MeshSize { disc, first_element_mm: FIRST_ELEMENT_PER_CONTACT * contact / resolution.retina_elements as f64 }
     }
 
-    /// Solves on a mesh around the estimated contact, from the displacements `start` (patch parameters and depth in layers
-    /// in, displacement out).
+    /// Solves on a mesh around the estimated contact, from the displacements `start` (patch parameters and depth in layers in, displacement out).
     ///
     /// # Errors
     /// [`PredictError::Mesh`], [`PredictError::Solver`].

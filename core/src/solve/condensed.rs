@@ -15,25 +15,23 @@
 
 mod model;
 
-use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::{Accum, Mat, Par};
-
 use super::border::Drive;
+use super::dense::Dense;
 use super::newton::{NewtonError, System, Workspace};
 use super::sparse::norm;
 use crate::assemble::Predicted;
 use crate::assemble::tail::{Stresses, Tail};
-use model::{Model, times};
+use model::Model;
 
 /// Relative difference below which the force on the driven vertex is that of the tail alone.
 const SAME: f64 = 1e-9;
 
 /// The tissue condensed to the tail, as of the last factorisation.
 pub(super) struct Condensed {
-    /// Schur complement S of the whole, row by row (mN/mm); empty: none is at hand.
-    whole: Mat<f64>,
+    /// Schur complement S of the whole (mN/mm); empty: none is at hand.
+    whole: Dense,
     /// Stiffness K of what is not in the tail.
-    tissue: Mat<f64>,
+    tissue: Dense,
     /// Memory for Hessians.
     hessian: Vec<f64>,
 }
@@ -41,13 +39,13 @@ pub(super) struct Condensed {
 impl Condensed {
     /// Leaves none at hand.
     pub fn forget(&mut self) {
-        self.whole = Mat::new();
+        self.whole = Dense::empty();
     }
 }
 
 impl Default for Condensed {
     fn default() -> Self {
-        Condensed { whole: Mat::new(), tissue: Mat::new(), hessian: Vec::new() }
+        Condensed { whole: Dense::empty(), tissue: Dense::empty(), hessian: Vec::new() }
     }
 }
 
@@ -63,25 +61,11 @@ impl System<'_> {
         if size == 0 {
             return;
         }
-        let lower = factor.tail(self.symbolic, size);
-        let mut whole = Mat::<f64>::zeros(size, size);
-        matmul(
-            whole.as_mut(),
-            BlockStructure::TriangularLower,
-            Accum::Replace,
-            lower.as_ref(),
-            BlockStructure::TriangularLower,
-            lower.as_ref().transpose(),
-            BlockStructure::TriangularUpper,
-            1.0,
-            Par::Seq,
-        );
+        let whole = factor.tail(self.symbolic, size).times_transposed();
         self.tail().hessian(positions, Stresses::Predicted(predicted), scratch, &mut condensed.hessian);
-        let stride = size + 3;
-        condensed.tissue = Mat::from_fn(size, size, |i, j| {
-            whole[(i.max(j), i.min(j))] - condensed.hessian[i.max(j) * stride + i.min(j)]
-        });
-        condensed.whole = Mat::from_fn(size, size, |i, j| whole[(i.max(j), i.min(j))]);
+        let own = |i: usize, j: usize| condensed.hessian[i.max(j) * (size + 3) + i.min(j)];
+        condensed.tissue = Dense::from_fn(size, |i, j| whole.at(i, j) - own(i, j));
+        condensed.whole = whole;
     }
 
     /// From the Newton step `newton` (free unknowns, then the border) at `positions` the one that meets the effects on the tail as they are at its end; `None`
@@ -101,7 +85,7 @@ impl System<'_> {
         let (free, tail) = (self.dofs.free, self.tail());
         let first = free - size;
         // What is held at a value ties the tail to all that is below: its multiplier would be one unknown more here.
-        if size == 0 || workspace.condensed.whole.nrows() != size || !workspace.held.slope.is_empty() {
+        if size == 0 || workspace.condensed.whole.size() != size || !workspace.held.slope.is_empty() {
             return Ok(None);
         }
         let gradient = tail.gradient(positions, &mut workspace.scratch);
@@ -115,7 +99,7 @@ impl System<'_> {
         let mut condensed = std::mem::take(&mut workspace.condensed);
         // The condensed residual, from the step that answers it: f + ∇e = −(S u + C t).
         let border = &workspace.values[self.pattern.stored()..];
-        let mut force = times(&condensed.whole, &start[..size]);
+        let mut force = condensed.whole.times(&start[..size]);
         for (i, force) in force.iter_mut().enumerate() {
             let coupled: f64 = (0..3).map(|k| border[k * free + first + i] * start[size + k]).sum();
             *force = -(*force + coupled + gradient[i]);
@@ -125,7 +109,7 @@ impl System<'_> {
         let refined = found.map(|found| {
             let change: Vec<f64> = found[..size].iter().zip(start).map(|(new, old)| new - old).collect();
             let mut rest = vec![0.0; free];
-            rest[first..].copy_from_slice(&times(&condensed.whole, &change));
+            rest[first..].copy_from_slice(&condensed.whole.times(&change));
             workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut rest)?;
             rest.iter_mut().zip(newton).for_each(|(r, n)| *r += n);
             rest.extend_from_slice(&found[size..]);

@@ -12,9 +12,10 @@ use faer::sparse::linalg::cholesky::{
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, Mat, MatMut, Par, Side, Spec};
+use faer::{Conj, MatMut, Par, Side, Spec};
 use thiserror::Error;
 
+use super::dense::Dense;
 use crate::assemble::Pattern;
 
 /// Why a linear system was not solved.
@@ -178,8 +179,8 @@ impl Factor {
     }
 
     /// The last `size` rows and columns of the factor L, its upper triangle zero.
-    pub(super) fn tail(&self, symbolic: &SymbolicFactor, size: usize) -> Mat<f64> {
-        let mut tail = Mat::zeros(size, size);
+    pub(super) fn tail(&self, symbolic: &SymbolicFactor, size: usize) -> Dense {
+        let mut tail = Dense::from_fn(size, |_, _| 0.0);
         let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.symbolic.raw() else { return tail };
         let first = raw.nrows() - size;
         let factor = SupernodalLltRef::new(raw, &self.values);
@@ -192,10 +193,10 @@ impl Factor {
             for column in first.saturating_sub(start)..values.ncols() {
                 let to = start + column - first;
                 for row in column..values.ncols() {
-                    tail[(start + row - first, to)] = values[(row, column)];
+                    tail.set(start + row - first, to, values[(row, column)]);
                 }
                 for (row, &at) in supernode.pattern().iter().enumerate() {
-                    tail[(at as usize - first, to)] = values[(values.ncols() + row, column)];
+                    tail.set(at as usize - first, to, values[(values.ncols() + row, column)]);
                 }
             }
         }

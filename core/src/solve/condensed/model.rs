@@ -1,10 +1,9 @@
 //! The small system of the tail: its energies as they are, the tissue below as a spring.
 
-use faer::prelude::Solve;
-use faer::{Mat, MatRef, Side};
 use nalgebra::Vector3;
 
 use super::super::border::{Drive, Reduced};
+use super::super::dense::Dense;
 use super::super::newton::{System, Workspace};
 use super::super::sparse::norm;
 use crate::assemble::tail::{Stresses, Tail};
@@ -15,6 +14,7 @@ const MAX_ITERATIONS: usize = 20;
 const MAX_HALVINGS: usize = 16;
 /// Residual over the first one at which it is solved: the tissue's own change is more than what is left.
 const REDUCTION: f64 = 0.05;
+
 /// The condensed problem at one state of the whole.
 pub(super) struct Model<'a> {
     /// The whole.
@@ -24,7 +24,7 @@ pub(super) struct Model<'a> {
     /// The tissue's condensed force f (mN).
     pub force: &'a [f64],
     /// Its condensed stiffness K (mN/mm).
-    pub tissue: &'a Mat<f64>,
+    pub tissue: &'a Dense,
     /// How the driven vertex moves.
     pub drive: Drive,
     /// The state of the whole.
@@ -83,18 +83,26 @@ impl Model<'_> {
         // Stresses far above those in balance turn the Hessian over; without them it is as definite as the tissue.
         let factor = [Stresses::Current, Stresses::None].into_iter().find_map(|stresses| {
             self.tail.hessian(&positions, stresses, &mut workspace.scratch, hessian);
-            let entry = |i: usize, j: usize| if i >= j { self.tissue[(i, j)] + hessian[i * stride + j] } else { 0.0 };
-            Mat::from_fn(size, size, entry).llt(Side::Lower).ok()
+            let entry = |i: usize, j: usize| if i >= j { self.tissue.at(i, j) + hessian[i * stride + j] } else { 0.0 };
+            Dense::from_fn(size, entry).cholesky()
         })?;
         let directions: Vec<Vector3<f64>> =
             self.drive.directions().into_iter().map(|(direction, _)| direction).collect();
-        let coupling =
-            |i: usize, direction: &Vector3<f64>| (0..3).map(|k| hessian[(size + k) * stride + i] * direction[k]).sum();
-        let couplings = Mat::from_fn(size, 1 + directions.len(), |i, d| {
-            if d == 0 { -at.residual[i] } else { coupling(i, &directions[d - 1]) }
-        });
-        let columns = factor.solve(&couplings);
-        let dot = |a: usize, b: usize| (0..size).map(|i| couplings[(i, a)] * columns[(i, b)]).sum::<f64>();
+        let mut columns: Vec<f64> = at.residual.iter().map(|r| -r).collect();
+        for direction in &directions {
+            let coupled = |i: usize| (0..3).map(|k| hessian[(size + k) * stride + i] * direction[k]).sum::<f64>();
+            columns.extend((0..size).map(coupled));
+        }
+        let couplings = columns.clone();
+        factor.solve(size, &mut columns);
+        let part = |column: usize| column * size..(column + 1) * size;
+        let dot = |a: usize, b: usize| {
+            couplings[part(a)]
+                .iter()
+                .zip(&columns[part(b)])
+                .map(|(coupling, response)| coupling * response)
+                .sum::<f64>()
+        };
         let mut reduced = Reduced { directions: &directions, stiffness: Vec::new(), drive: Vec::new() };
         for (row, along) in directions.iter().enumerate() {
             for (column, other) in directions.iter().enumerate() {
@@ -107,9 +115,9 @@ impl Model<'_> {
             reduced.drive.push(-at.out_of_balance[row] - dot(1 + row, 0));
         }
         let travels = reduced.solve(max_travel_mm);
-        let mut step: Vec<f64> = (0..size).map(|i| columns[(i, 0)]).collect();
-        for (d, travel) in travels.iter().enumerate() {
-            step.iter_mut().enumerate().for_each(|(i, s)| *s -= travel * columns[(i, 1 + d)]);
+        let mut step = columns[part(0)].to_vec();
+        for (direction, travel) in travels.iter().enumerate() {
+            step.iter_mut().zip(&columns[part(1 + direction)]).for_each(|(s, response)| *s -= travel * response);
         }
         let moved: Vector3<f64> = directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
         step.extend(moved.iter());
@@ -147,7 +155,7 @@ impl Model<'_> {
     fn state(&self, unknowns: Vec<f64>, workspace: &mut Workspace) -> State {
         let size = self.force.len();
         let gradient = self.tail.gradient(&self.positions(&unknowns), &mut workspace.scratch);
-        let mut residual = times(self.tissue, &unknowns[..size]);
+        let mut residual = self.tissue.times(&unknowns[..size]);
         for (i, r) in residual.iter_mut().enumerate() {
             *r += self.force[i] + gradient[i];
         }
@@ -159,14 +167,8 @@ impl Model<'_> {
     fn potential(&self, at: &[f64], workspace: &mut Workspace) -> f64 {
         let size = self.force.len();
         let own = self.tail.energy(&self.positions(at), &mut workspace.scratch);
-        let stretched = times(self.tissue, &at[..size]);
+        let stretched = self.tissue.times(&at[..size]);
         let tissue: f64 = (0..size).map(|i| at[i] * (self.force[i] + 0.5 * stretched[i])).sum();
         own + tissue - self.drive.work(&Vector3::from_row_slice(&at[size..]))
     }
-}
-
-/// Matrix times vector.
-pub(super) fn times(matrix: &Mat<f64>, vector: &[f64]) -> Vec<f64> {
-    let product = matrix * MatRef::from_column_major_slice(vector, vector.len(), 1);
-    (0..vector.len()).map(|i| product[(i, 0)]).collect()
 }
