@@ -308,7 +308,6 @@ fn nested_dissection_is_a_permutation_with_less_fill() {
             SymbolicFactor::new(&pattern).unwrap().stored()
         };
         let fill = stored(&|point, level| (rank[point], level));
-        // Lattice point by lattice point, from the core outwards.
         let natural = stored(&|point, level| (point, level));
         assert!((fill as f64) < 0.9 * natural as f64, "{division:?}: {fill} of {natural} entries");
     }
