@@ -50,6 +50,9 @@ const CHORD_BELOW: f64 = 1e-2;
 /// A chord step must bring the residual down to this share: it costs a fifth to a quarter of an iteration, of which few are left here.
 const CHORD_REDUCTION: f64 = 0.2;
 
+/// Residual over force scale above which a chord step is refined: below, the contact has found its points.
+const REFINED_ABOVE: f64 = 1e-3;
+
 /// What a converged solve cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NewtonReport {
@@ -292,8 +295,10 @@ impl System<'_> {
     ) -> Result<bool, NewtonError> {
         let before = positions.to_vec();
         let (plain, _) = self.step(drive, settings.max_travel_mm, workspace)?;
-        let refined = self.refine(&before, &plain, drive, settings.max_travel_mm, workspace)?;
-        let step = refined.unwrap_or(plain);
+        let step = match report.residual_mn > REFINED_ABOVE * settings.force_scale_mn {
+            true => self.refine(&before, &plain, drive, settings.max_travel_mm, workspace)?.unwrap_or(plain),
+            false => plain,
+        };
         let change = step.get(self.dofs.free + 3).copied().unwrap_or_default();
         self.change_multiplier(change);
         self.dofs.advance(positions, &step, 1.0);
