@@ -31,7 +31,7 @@ fn everything(coefficient: f64, to_mmhg: f64, strength_kpa: f64) -> Scene {
 
 const CASES: &[Case] = &[
     case("µ 0, leaning", || rough(0.0), || lean(ball(), 20.0, 40.0, 0.5), Answer(5)),
-    case("µ 0.015, leaning", || rough(0.015), || lean(ball(), 20.0, 40.0, 0.5), Answer(7)),
+    case("µ 0.015, leaning", || rough(0.015), || lean(ball(), 20.0, 40.0, 0.5), Answer(9)),
     case("µ 0.5, leaning", || rough(0.5), || lean(ball(), 20.0, 40.0, 0.5), Answer(19)),
     case("µ 2, leaning", || rough(2.0), || lean(ball(), 20.0, 40.0, 0.5), Answer(15)),
     case("µ 2, straight", || rough(2.0), || push(ball(), 0.8), Answer(7)),

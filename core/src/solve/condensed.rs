@@ -15,6 +15,8 @@
 
 mod model;
 
+use nalgebra::Vector3;
+
 use super::border::Drive;
 use super::dense::Dense;
 use super::newton::{NewtonError, System, Workspace};
@@ -117,6 +119,15 @@ impl System<'_> {
         });
         workspace.condensed = condensed;
         refined.transpose()
+    }
+
+    /// The slope of the potential along `step`.
+    pub(super) fn slope(&self, step: &[f64], drive: Drive, workspace: &Workspace) -> f64 {
+        let free = self.dofs.free;
+        let residual = &workspace.residual;
+        let moved = Vector3::from_row_slice(&step[free..]);
+        let held = Vector3::from_row_slice(&residual[free..]).dot(&moved) - drive.work(&moved);
+        (step[..free].iter().zip(residual).map(|(s, r)| s * r).sum::<f64>() + held).min(0.0)
     }
 
     /// Replaces predicted stresses of the effects on the tail by those at `positions`.

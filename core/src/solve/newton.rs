@@ -5,8 +5,7 @@
 //! method (`border.rs`: one factor, a right-hand side more for each direction). Where the Hessian is not positive definite it is changed until it is, and only then
 //! (projecting always would cost the quadratic convergence of nearly incompressible elements).
 //!
-//! Near the end the Hessian hardly changes any more: there the last factor is used again for as long as it pays (chord steps), at a fraction of the cost
-//! of a new one.
+//! Near the end the Hessian hardly changes any more: there the last factor is used again for as long as it pays (chord steps), at a fraction of the cost of a new one.
 //!
 //! What an effect holds at a value (an enclosed volume) is one equation more, and its multiplier one unknown more (`held.rs`).
 //!
@@ -187,8 +186,7 @@ impl System<'_> {
         total
     }
 
-    /// Fills `workspace.residual` with the out-of-balance forces: free unknowns, then the raw force on the driven vertex. Returns the norm
-    /// over what must vanish.
+    /// Fills `workspace.residual` with the out-of-balance forces: free unknowns, then the raw force on the driven vertex. Returns the norm over what must vanish.
     pub(super) fn residual(&self, positions: &[f64], drive: Drive, workspace: &mut Workspace) -> f64 {
         gradient(self.terms, positions, self.dofs, &mut workspace.scratch, &mut workspace.residual);
         let free = self.dofs.free;
@@ -295,9 +293,10 @@ impl System<'_> {
     ) -> Result<bool, NewtonError> {
         let before = positions.to_vec();
         let (plain, _) = self.step(drive, settings.max_travel_mm, workspace)?;
-        let step = match report.residual_mn > REFINED_ABOVE * settings.force_scale_mn {
-            true => self.refine(&before, &plain, drive, settings.max_travel_mm, workspace)?.unwrap_or(plain),
-            false => plain,
+        let step = if report.residual_mn > REFINED_ABOVE * settings.force_scale_mn {
+            self.refine(&before, &plain, drive, settings.max_travel_mm, workspace)?.unwrap_or(plain)
+        } else {
+            plain
         };
         let change = step.get(self.dofs.free + 3).copied().unwrap_or_default();
         self.change_multiplier(change);
@@ -374,15 +373,6 @@ impl System<'_> {
             step.push(change);
         }
         Ok((step, slope.min(0.0)))
-    }
-
-    /// The slope of the potential along `step`.
-    fn slope(&self, step: &[f64], drive: Drive, workspace: &Workspace) -> f64 {
-        let free = self.dofs.free;
-        let residual = &workspace.residual;
-        let moved = Vector3::from_row_slice(&step[free..]);
-        let held = Vector3::from_row_slice(&residual[free..]).dot(&moved) - drive.work(&moved);
-        (step[..free].iter().zip(residual).map(|(s, r)| s * r).sum::<f64>() + held).min(0.0)
     }
 
     fn bad_start(&self, positions: &[f64], scratch: &mut Scratch) -> NewtonError {
