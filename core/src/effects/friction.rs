@@ -113,7 +113,7 @@ impl Friction<'_> {
     }
 
     /// The anchor (from the tip, in the frame of the positions, mm) that a point has after this slip: the old one while it sticks; what slips drags it behind
-    /// itself at the distance [`AT_REST`] ε, where friction is short of its limit by one part in ten thousand, so that a needle that stops meets tissue that sticks.
+    /// itself at the distance `AT_REST` ε, where friction is short of its limit by one part in ten thousand, so that a needle that stops meets tissue that sticks.
     pub fn dragged(&self, local: &Local, rubbing: &RubbingPoint) -> Vector3<f64> {
         let slip = self.slip(local, rubbing);
         let y = slip.norm();
