@@ -58,10 +58,15 @@ impl Decision {
     /// Takes in what is decided of the scene's fluid, which acts before anything is pressed.
     pub fn with_bleb(mut self, bleb: EffectReport) -> Self {
         self.bleb = bleb.simulated;
-        if let Some(place) = self.reports.iter_mut().find(|report| report.name == bleb.name) {
-            *place = bleb;
-        }
+        self.tell(bleb);
         self
+    }
+
+    /// Puts `report` in the place of what was told of its effect.
+    pub fn tell(&mut self, report: EffectReport) {
+        if let Some(place) = self.reports.iter_mut().find(|place| place.name == report.name) {
+            *place = report;
+        }
     }
 
     /// Whether where the tissue ends up depends on the way there, however slowly it is gone.

@@ -77,9 +77,7 @@ pub(super) fn decide(prepared: &PreparedScene, sequence: &Sequence, plan: &Plan)
             value: touches.then_some(value),
             threshold: touches.then_some(RATE_TOLERANCE),
         };
-        if let Some(place) = decision.reports.iter_mut().find(|report| report.name == name) {
-            *place = report;
-        }
+        decision.tell(report);
         simulated
     };
     let relaxation = format!(
@@ -98,9 +96,7 @@ pub(super) fn decide(prepared: &PreparedScene, sequence: &Sequence, plan: &Plan)
         let pull = Pull { normal_force_mn: plan.expected.pull.normal_force_mn * (1.0 + borne), ..plan.expected.pull };
         let report = report_adhesion(&sequence.effects, sequence.level, decision.contact, &pull);
         decision.adhesion = report.simulated;
-        if let Some(place) = decision.reports.iter_mut().find(|place| place.name == report.name) {
-            *place = report;
-        }
+        decision.tell(report);
     }
     (decision, rates)
 }

@@ -59,14 +59,58 @@ impl Drive {
     }
 }
 
-/// What is left of the system for the coordinates of the driven vertex when the free part is eliminated.
-pub(super) struct Reduced<'a> {
+/// The system with its free part solved for each right-hand side, columns of as many entries as that has unknowns one after the other.
+pub(super) struct Bordered<'a> {
     /// The directions.
     pub directions: &'a [Vector3<f64>],
+    /// The coupling columns C, one for each direction (mN/mm).
+    pub couplings: &'a [f64],
+    /// K⁻¹ of the free part's forces, then K⁻¹ C.
+    pub columns: &'a [f64],
+    /// Out-of-balance force along each direction (mN).
+    pub out_of_balance: &'a [f64],
+}
+
+impl Bordered<'_> {
+    /// The step of the free part, then of the driven vertex, which moves by no more than `most_mm`; and its travel along each direction (mm). `corner` is the driven vertex's own
+    /// stiffness (row, column ≤ row).
+    pub fn step(&self, corner: impl Fn(usize, usize) -> f64, most_mm: f64) -> (Vec<f64>, Vec<f64>) {
+        let size = self.columns.len() / (1 + self.directions.len());
+        let (alone, responses) = self.columns.split_at(size);
+        let part = |direction: usize| direction * size..(direction + 1) * size;
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let coupling = |direction: usize| &self.couplings[part(direction)];
+        let response = |direction: usize| &responses[part(direction)];
+        let mut reduced = Reduced { directions: self.directions, stiffness: Vec::new(), drive: Vec::new() };
+        for (row, along) in self.directions.iter().enumerate() {
+            for (column, other) in self.directions.iter().enumerate() {
+                let own: f64 = (0..3)
+                    .flat_map(|i| (0..3).map(move |j| (i, j)))
+                    .map(|(i, j)| along[i] * other[j] * corner(i.max(j), i.min(j)))
+                    .sum();
+                reduced.stiffness.push(own - dot(coupling(row), response(column)));
+            }
+            reduced.drive.push(-self.out_of_balance[row] - dot(coupling(row), alone));
+        }
+        let travels = reduced.solve(most_mm);
+        let mut step = alone.to_vec();
+        for (direction, travel) in travels.iter().enumerate() {
+            step.iter_mut().zip(response(direction)).for_each(|(s, r)| *s -= travel * r);
+        }
+        let moved: Vector3<f64> =
+            self.directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
+        step.extend(moved.iter());
+        (step, travels)
+    }
+}
+
+/// What is left of the system for the coordinates of the driven vertex when the free part is eliminated.
+struct Reduced<'a> {
+    directions: &'a [Vector3<f64>],
     /// The small matrix S, row by row (mN/mm).
-    pub stiffness: Vec<f64>,
+    stiffness: Vec<f64>,
     /// The small right-hand side g (mN).
-    pub drive: Vec<f64>,
+    drive: Vec<f64>,
 }
 
 /// Stiffness over the largest one from which on a direction counts as stiff.

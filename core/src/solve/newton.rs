@@ -18,8 +18,8 @@ use std::ops::AddAssign;
 use nalgebra::Vector3;
 use thiserror::Error;
 
+use super::border::Bordered;
 pub use super::border::Drive;
-use super::border::Reduced;
 use super::condensed::Condensed;
 pub use super::globalization::Globalization;
 use super::globalization::{Step, Trial};
@@ -334,7 +334,6 @@ impl System<'_> {
         }
         let couplings = columns[free..].to_vec();
         columns.extend_from_slice(&workspace.held.slope);
-        let coupling = |direction: usize| &couplings[direction * free..(direction + 1) * free];
         workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut columns)?;
         let mut changes = Vec::new();
         if !workspace.held.slope.is_empty() {
@@ -344,29 +343,15 @@ impl System<'_> {
             let columns = bent.chunks_exact_mut(free).enumerate();
             changes.extend(columns.map(|(index, column)| border.bend(column, if index == 0 { missing } else { 0.0 })));
         }
-        let (alone, responses) = columns.split_at(free);
-        let response = |direction: usize| &responses[direction * free..(direction + 1) * free];
+        let bordered = Bordered {
+            directions: &directions,
+            couplings: &couplings,
+            columns: &columns[..(1 + directions.len()) * free],
+            out_of_balance: &out_of_balance,
+        };
+        let (mut step, travels) = bordered.step(|row, column| corner[3 * row + column], max_travel_mm);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-        let mut reduced = Reduced { directions: &directions, stiffness: Vec::new(), drive: Vec::new() };
-        for (row, along) in directions.iter().enumerate() {
-            for (column, other) in directions.iter().enumerate() {
-                let own: f64 = (0..3)
-                    .flat_map(|i| (0..3).map(move |j| (i, j)))
-                    .map(|(i, j)| along[i] * other[j] * corner[3 * i.max(j) + i.min(j)])
-                    .sum();
-                reduced.stiffness.push(own - dot(coupling(row), response(column)));
-            }
-            reduced.drive.push(-out_of_balance[row] - dot(coupling(row), alone));
-        }
-        let travels = reduced.solve(max_travel_mm);
-        let mut step = alone.to_vec();
-        for (direction, travel) in travels.iter().enumerate() {
-            step.iter_mut().zip(response(direction)).for_each(|(s, r)| *s -= travel * r);
-        }
-        let mut slope =
-            step.iter().zip(&residual[..free]).map(|(s, r)| s * r).sum::<f64>() + dot(&travels, &out_of_balance);
-        let moved: Vector3<f64> = directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
-        step.extend(moved.iter());
+        let mut slope = dot(&step[..free], &residual[..free]) + dot(&travels, &out_of_balance);
         if let [alone, with_travel @ ..] = &changes[..] {
             let change = alone - dot(&travels, with_travel);
             slope -= change * workspace.held.missing;

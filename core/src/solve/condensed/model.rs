@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::super::border::{Drive, Reduced};
+use super::super::border::{Bordered, Drive};
 use super::super::dense::Dense;
 use super::super::newton::{System, Workspace};
 use super::super::sparse::norm;
@@ -93,34 +93,16 @@ impl Model<'_> {
             let coupled = |i: usize| (0..3).map(|k| hessian[(size + k) * stride + i] * direction[k]).sum::<f64>();
             columns.extend((0..size).map(coupled));
         }
-        let couplings = columns.clone();
+        let couplings = columns[size..].to_vec();
         factor.solve(size, &mut columns);
-        let part = |column: usize| column * size..(column + 1) * size;
-        let dot = |a: usize, b: usize| {
-            couplings[part(a)]
-                .iter()
-                .zip(&columns[part(b)])
-                .map(|(coupling, response)| coupling * response)
-                .sum::<f64>()
+        let bordered = Bordered {
+            directions: &directions,
+            couplings: &couplings,
+            columns: &columns,
+            out_of_balance: &at.out_of_balance,
         };
-        let mut reduced = Reduced { directions: &directions, stiffness: Vec::new(), drive: Vec::new() };
-        for (row, along) in directions.iter().enumerate() {
-            for (column, other) in directions.iter().enumerate() {
-                let own: f64 = (0..3)
-                    .flat_map(|i| (0..3).map(move |j| (i, j)))
-                    .map(|(i, j)| along[i] * other[j] * hessian[(size + i.max(j)) * stride + size + i.min(j)])
-                    .sum();
-                reduced.stiffness.push(own - dot(1 + row, 1 + column));
-            }
-            reduced.drive.push(-at.out_of_balance[row] - dot(1 + row, 0));
-        }
-        let travels = reduced.solve(max_travel_mm);
-        let mut step = columns[part(0)].to_vec();
-        for (direction, travel) in travels.iter().enumerate() {
-            step.iter_mut().zip(&columns[part(1 + direction)]).for_each(|(s, response)| *s -= travel * response);
-        }
-        let moved: Vector3<f64> = directions.iter().zip(&travels).map(|(direction, travel)| direction * *travel).sum();
-        step.extend(moved.iter());
+        let corner = |row: usize, column: usize| hessian[(size + row) * stride + size + column];
+        let (step, _) = bordered.step(corner, max_travel_mm);
         Some(step)
     }
 
