@@ -1,12 +1,13 @@
 //! The equilibrium of one contact on one mesh: needle, wall and force in; positions, travel and reaction out.
 //!
 //! Patch frame throughout. [`Wall`] is the meshed problem; [`Wall::solve`] finds its equilibrium from a start, directly if it can, by load
-//! steps if it must. Read on in `load` (what is asked and answered), `guide` (how the tip is held), `attempts` (ways to an equilibrium), `light` (forces too small to move the tissue), `friction` (its repetition), `grip` (what it remembers),
+//! steps if it must. Read on in `load` (what is asked and answered), `guide` (how the tip is held), `attempts` (ways to an equilibrium), `error` (why there is none), `light` (forces too small to move the tissue), `friction` (its repetition), `grip` (what it remembers),
 //! `bleb` (fluid under the retina), `reading` (what is read
 //! off), `settled` (the wall under pressure alone). Not here: how fine a mesh a level uses, where the mesh is centred.
 
 mod attempts;
 pub mod bleb;
+pub mod error;
 pub mod friction;
 pub mod grip;
 mod guide;
@@ -43,6 +44,8 @@ pub struct Wall<'a> {
     settled: Option<Vec<f64>>,
     /// Force of the pressure on the whole surface (mN).
     pressure_force_mn: f64,
+    /// |principal stretch − 1| that the tissue bears.
+    bears_strain: f64,
 }
 
 /// Iterations that bring the needle to first contact.
@@ -93,6 +96,7 @@ impl<'a> Wall<'a> {
             rim_mm,
             settled: None,
             pressure_force_mn: 0.0,
+            bears_strain: f64::INFINITY,
         })
     }
 
@@ -104,6 +108,11 @@ impl<'a> Wall<'a> {
     /// The inner surface's faces at rest.
     pub fn faces(&self) -> &ContactFaces {
         &self.faces
+    }
+
+    /// Lets the tissue puncture at this |principal stretch − 1|: where it is beyond and not at rest, no further way to an equilibrium is tried.
+    pub fn puncture_at(&mut self, strain: f64) {
+        self.bears_strain = strain;
     }
 
     /// Lets the wall begin, and its rim stand, where every point has sunk along its column under `pressure_kpa`.

@@ -2,6 +2,7 @@
 //! load, and a single Newton solve that is not allowed another start refuses by name.
 
 use nalgebra::{Isometry3, Translation3, Vector3};
+use retina_core::equilibrium::error::EquilibriumError;
 use retina_core::equilibrium::{Equilibrium, Load, MeshSize, Motion, Solid, Tool, Wall};
 use retina_core::mesh::disc::DiscGeometry;
 use retina_core::mesh::wall::WallTopology;
@@ -76,7 +77,7 @@ fn bad_starts(wall: &Wall) -> Vec<(String, Vec<f64>)> {
     starts
 }
 
-fn solve(wall: &Wall, motion: &Motion, start: Vec<f64>) -> Result<Equilibrium, NewtonError> {
+fn solve(wall: &Wall, motion: &Motion, start: Vec<f64>) -> Result<Equilibrium, EquilibriumError> {
     let load = Load { motion, touch_mm: wall.touch(&motion.direction, 0.0).unwrap_or(0.0), additions: &[] };
     let mut workspace = Workspace::new(&wall.topology().pattern, &wall.topology().symbolic);
     wall.solve(&load, start, &mut workspace, &mut Silent)
@@ -158,6 +159,7 @@ fn a_single_solve_names_the_effect_that_cannot_start_there() {
             force_scale_mn: 0.01,
             tolerance_mn: 1e-9,
             max_iterations: 40,
+            max_weakened: 40,
             max_travel_mm: 0.1,
         };
         for (name, mut positions) in bad_starts(&wall) {

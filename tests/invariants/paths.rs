@@ -1,6 +1,7 @@
 //! Laws of sequences in which the way matters: friction that sticks, slips and turns back, a bond that never heals, an eye under pressure.
 
 use nalgebra::{Point3, Vector3};
+use retina_core::equilibrium::error::EquilibriumError;
 use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::finite_element::Resolution;
 use retina_core::predict::{Control, EffectChoice, Level, PredictError, Prediction, PreparedScene, Request};
@@ -343,7 +344,10 @@ fn a_step_without_an_equilibrium_is_named_with_its_cause_and_a_hard_one_is_compu
         .expect_err("no equilibrium was found when this was written; take a harder one if it is now");
     println!("{error}");
     let SequenceError::At { step, cause, .. } = &error else { panic!("{error}") };
-    assert!(*step == 1 && matches!(cause, PredictError::Friction { .. }), "{error}");
+    assert!(
+        *step == 1 && matches!(cause, PredictError::Solver { cause: EquilibriumError::NotSettled { .. }, .. }),
+        "{error}"
+    );
     assert!(error.to_string().contains("steps[1]") && error.to_string().contains("`friction`"), "{error}");
     let warnings = run(NeedleShape::bevelled(0.257), 0.08).unwrap();
     assert!(warnings.iter().any(|warning| warning.contains("parts of its time")), "{warnings:?}");

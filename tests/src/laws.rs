@@ -7,7 +7,7 @@
 
 use nalgebra::Point3;
 use retina_core::equilibrium::bleb::VOLUME_TOLERANCE;
-use retina_core::equilibrium::friction::FrictionError;
+use retina_core::equilibrium::error::EquilibriumError;
 use retina_core::needle::Needle;
 use retina_core::predict::{ContactState, Control, Level, PENETRATION_WARNING_MM, PredictError, Prediction, Request};
 use retina_core::scene::Scene;
@@ -145,12 +145,14 @@ pub enum Kind {
 /// The kind of an error and the cause that it names, in a few words.
 pub fn cause(error: &PredictError) -> (Kind, &'static str) {
     use Kind::{Failed, Refused};
-    let newton = |cause: &NewtonError| match cause {
-        NewtonError::NotConverged { .. } => "no equilibrium: iterations used up",
-        NewtonError::NoStep { .. } => "no equilibrium: no acceptable step",
-        NewtonError::BadStart { .. } => "the start is not admissible",
-        NewtonError::Linear(_) => "no equilibrium: linear system",
-        NewtonError::Interrupted { .. } => "interrupted",
+    let solver = |cause: &EquilibriumError| match cause {
+        EquilibriumError::Newton(NewtonError::NotConverged { .. }) => "no equilibrium: iterations used up",
+        EquilibriumError::Newton(NewtonError::NoStep { .. }) => "no equilibrium: no acceptable step",
+        EquilibriumError::Newton(NewtonError::BadStart { .. }) => "the start is not admissible",
+        EquilibriumError::Newton(NewtonError::Linear(_)) => "no equilibrium: linear system",
+        EquilibriumError::Newton(NewtonError::Interrupted { .. }) => "interrupted",
+        EquilibriumError::NotSettled { .. } => "friction does not settle",
+        EquilibriumError::Torn { .. } => "no equilibrium: the tissue punctures",
     };
     match error {
         PredictError::Budget { .. } => (Refused, "budget"),
@@ -169,8 +171,6 @@ pub fn cause(error: &PredictError) -> (Kind, &'static str) {
         PredictError::Linear(_) => (Failed, "level linear"),
         PredictError::BlebOutsidePatch { .. } => (Refused, "bleb outside the patch"),
         PredictError::BesideBleb { .. } => (Refused, "beside the bleb"),
-        PredictError::Solver { cause, .. } | PredictError::Bleb { cause, .. } => (Failed, newton(cause)),
-        PredictError::Friction { cause: FrictionError::Newton(cause), .. } => (Failed, newton(cause)),
-        PredictError::Friction { cause: FrictionError::NotSettled { .. }, .. } => (Failed, "friction does not settle"),
+        PredictError::Solver { cause, .. } | PredictError::Bleb { cause, .. } => (Failed, solver(cause)),
     }
 }

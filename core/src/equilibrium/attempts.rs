@@ -4,6 +4,7 @@
 
 use nalgebra::Vector3;
 
+use super::error::EquilibriumError;
 use super::{ContactSettings, Equilibrium, Load, Motion, Wall};
 use crate::effect::Multiplier;
 use crate::mesh::wall::Place;
@@ -18,6 +19,8 @@ pub(super) struct Attempt {
     globalization: Globalization,
     /// Newton iterations for each load step.
     max_iterations: usize,
+    /// How many of them may find the tissue about to buckle.
+    max_weakened: usize,
     /// Whether it goes on from the equilibrium of a load that is nearly this one, the factor at hand.
     resumes: bool,
     /// Largest travel in one Newton iteration, in that of a direct attempt.
@@ -33,12 +36,15 @@ const POSE_FORCE_SCALE_MN: f64 = 0.01;
 const ROUNDING: f64 = 1e-15;
 /// The same in a wall under pressure, over the force of the pressure on the whole surface.
 const SMALLEST_FORCE_SHARE: f64 = 1e-5;
+/// Iterations of a direct attempt that may find the tissue about to buckle: those that came to rest took ten at most.
+const DIRECT_WEAKENED: usize = 15;
 /// What is tried, in this order: directly from the given start, then from first touch in load steps.
 const ATTEMPTS: [Attempt; 4] = [
     Attempt {
         load_steps: 1,
         globalization: Globalization::PredictedStress,
         max_iterations: 45,
+        max_weakened: DIRECT_WEAKENED,
         resumes: false,
         travel_share: 1.0,
     },
@@ -46,6 +52,7 @@ const ATTEMPTS: [Attempt; 4] = [
         load_steps: 4,
         globalization: Globalization::PredictedStress,
         max_iterations: 30,
+        max_weakened: 30,
         resumes: false,
         travel_share: 1.0,
     },
@@ -53,6 +60,7 @@ const ATTEMPTS: [Attempt; 4] = [
         load_steps: 8,
         globalization: Globalization::PredictedStress,
         max_iterations: 30,
+        max_weakened: 30,
         resumes: false,
         travel_share: 1.0,
     },
@@ -60,6 +68,7 @@ const ATTEMPTS: [Attempt; 4] = [
         load_steps: 12,
         globalization: Globalization::LineSearch,
         max_iterations: 100,
+        max_weakened: 100,
         resumes: false,
         travel_share: 1.0,
     },
@@ -74,6 +83,7 @@ pub(super) const REPETITIONS: [Attempt; 2] = [
         load_steps: 1,
         globalization: Globalization::PredictedStress,
         max_iterations: 45,
+        max_weakened: 45,
         resumes: true,
         travel_share: ROUND_TRAVEL,
     },
@@ -81,12 +91,15 @@ pub(super) const REPETITIONS: [Attempt; 2] = [
         load_steps: 1,
         globalization: Globalization::LineSearch,
         max_iterations: 100,
+        max_weakened: 100,
         resumes: false,
         travel_share: ROUND_TRAVEL,
     },
 ];
 /// Iterations of all attempts together: what takes more is a sharp edge that cuts its way in, where no load path of this model ends.
 const MOST_ITERATIONS: usize = 120;
+/// The same from where the tissue is strained beyond what it bears: as many as one direct attempt.
+const MOST_ITERATIONS_TORN: usize = 45;
 /// Share of the remaining way by which the needle overlaps the tissue at the start of load steps.
 const FIRST_OVERLAP: f64 = 0.05;
 /// Largest travel in one Newton iteration, in needle radii.
@@ -96,17 +109,17 @@ impl Wall<'_> {
     /// Finds the equilibrium under `load` from the start `positions` (tissue and tip).
     ///
     /// # Errors
-    /// The failure of the last attempt.
+    /// The failure of the last attempt; [`EquilibriumError::Torn`] where the tissue is strained beyond what it bears by then.
     pub fn solve(
         &self,
         load: &Load,
         positions: Vec<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
-    ) -> Result<Equilibrium, NewtonError> {
+    ) -> Result<Equilibrium, EquilibriumError> {
         let mut start = Some(positions);
         let mut spent = 0;
-        let mut failure = NewtonError::Interrupted { iterations: 0 };
+        let mut failure = EquilibriumError::Newton(NewtonError::Interrupted { iterations: 0 });
         for attempt in &ATTEMPTS {
             if spent >= MOST_ITERATIONS {
                 break;
@@ -117,11 +130,12 @@ impl Wall<'_> {
                     equilibrium.newton.iterations = spent;
                     return Ok(equilibrium);
                 }
-                Err(stop @ NewtonError::Interrupted { .. }) => return Err(stop),
+                Err(stop @ EquilibriumError::Torn { .. }) => return Err(stop),
+                Err(stop) if stop.is_interrupted() => return Err(stop),
                 Err(error) => failure = error,
             }
         }
-        if let NewtonError::NotConverged { iterations, .. } = &mut failure {
+        if let EquilibriumError::Newton(NewtonError::NotConverged { iterations, .. }) = &mut failure {
             *iterations = spent;
         }
         Err(failure)
@@ -130,14 +144,14 @@ impl Wall<'_> {
     /// As [`Wall::solve`], without load steps where the start is no good one.
     ///
     /// # Errors
-    /// [`NewtonError`].
+    /// [`EquilibriumError`].
     pub(super) fn solve_directly(
         &self,
         load: &Load,
         positions: Vec<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
-    ) -> Result<Equilibrium, NewtonError> {
+    ) -> Result<Equilibrium, EquilibriumError> {
         let mut spent = 0;
         let mut found = self.follow(load, &ATTEMPTS[0], positions, &mut spent, workspace, progress)?;
         found.newton.iterations = spent;
@@ -162,7 +176,7 @@ impl Wall<'_> {
         spent: &mut usize,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
-    ) -> Result<Equilibrium, NewtonError> {
+    ) -> Result<Equilibrium, EquilibriumError> {
         let Load { motion, touch_mm, .. } = *load;
         let softened = self.contact.softened();
         load.multipliers().for_each(Multiplier::reset);
@@ -173,17 +187,35 @@ impl Wall<'_> {
                 self.hold_at(&mut positions, motion, touch_mm + share * (motion.travel_mm - touch_mm));
             }
             let drive = self.drive(motion, share);
-            if self.contact.softening > 1.0 {
-                let drive = (drive, SOFTENED_TOLERANCE);
-                total += self.newton(&softened, drive, load, attempt, &mut positions, spent, workspace, progress)?;
-            }
-            if self.contact.softening <= 1.0 || step == attempt.load_steps {
-                let drive = (drive, self.contact.tolerance);
-                total +=
-                    self.newton(&self.contact, drive, load, attempt, &mut positions, spent, workspace, progress)?;
+            let softly = (&softened, SOFTENED_TOLERANCE);
+            let proper = (&self.contact, self.contact.tolerance);
+            let softly = (self.contact.softening > 1.0).then_some(softly);
+            let proper = (softly.is_none() || step == attempt.load_steps).then_some(proper);
+            for (contact, tolerance) in softly.into_iter().chain(proper) {
+                let drive = (drive, tolerance);
+                total += self
+                    .newton(contact, drive, load, attempt, &mut positions, spent, workspace, progress)
+                    .map_err(|cause| self.judged(cause, &positions, *spent))?;
             }
         }
         Ok(self.equilibrium(motion, positions, total, attempt.load_steps, workspace))
+    }
+
+    /// How far the tissue is strained, if that is beyond what it bears.
+    fn overstrain(&self, positions: &[f64]) -> Option<f64> {
+        let bounded = self.bears_strain.is_finite();
+        let strain = bounded.then(|| self.strains(positions).max_strain);
+        strain.filter(|strain| *strain > self.bears_strain)
+    }
+
+    /// What it means that a solve failed with `cause` at `positions`: tissue that is strained beyond what it bears punctures.
+    fn judged(&self, cause: NewtonError, positions: &[f64], iterations: usize) -> EquilibriumError {
+        match (cause, self.overstrain(positions)) {
+            (NewtonError::NotConverged { .. } | NewtonError::NoStep { .. } | NewtonError::Linear(_), Some(strain)) => {
+                EquilibriumError::Torn { iterations, strain, limit: self.bears_strain }
+            }
+            (cause, _) => cause.into(),
+        }
     }
 
     /// One Newton solve with this contact, to the given tolerance relative to the force scale.
@@ -218,11 +250,14 @@ impl Wall<'_> {
         let force_mn = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN);
         let scale = force_mn.max(smallest);
         let light_mn = self.light_residual_mn(&terms[0], force_mn);
+        let torn = *spent > 0 && self.overstrain(positions).is_some();
+        let most = if torn { MOST_ITERATIONS_TORN } else { MOST_ITERATIONS };
         let settings = NewtonSettings {
             globalization: attempt.globalization,
             force_scale_mn: scale,
             tolerance_mn: (tolerance * scale).max(light_mn),
-            max_iterations: attempt.max_iterations.min(MOST_ITERATIONS.saturating_sub(*spent)),
+            max_iterations: attempt.max_iterations.min(most.saturating_sub(*spent)),
+            max_weakened: attempt.max_weakened,
             max_travel_mm: attempt.travel_share * MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
         };
         let solved = match attempt.resumes {

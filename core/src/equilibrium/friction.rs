@@ -7,9 +7,9 @@
 //! Not here: the energy (`effects::friction`), what is remembered of earlier motions (`grip`).
 
 use nalgebra::Vector3;
-use thiserror::Error;
 
 use super::attempts::REPETITIONS;
+use super::error::EquilibriumError;
 use super::grip::{Approach, Grip};
 use super::{Addition, Equilibrium, Load, Wall};
 use crate::effect::{Effect, Local};
@@ -45,26 +45,6 @@ const NARROWING: f64 = 0.25;
 /// Bounds of the share of the found pressures in the next mix.
 const MIX: (f64, f64) = (0.05, 1.0);
 
-/// Why there is no equilibrium with friction.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum FrictionError {
-    /// A solve failed.
-    #[error(transparent)]
-    Newton(#[from] NewtonError),
-    /// The pressures kept changing.
-    #[error(
-        "`friction`: the contact pressures did not settle in {rounds} rounds (they change by {change:.2e} of their sum, allowed {allowed:.0e})"
-    )]
-    NotSettled {
-        /// Rounds made.
-        rounds: usize,
-        /// Change of the pressures in the last round, relative to their sum.
-        change: f64,
-        /// Allowed change.
-        allowed: f64,
-    },
-}
-
 /// How the tissue rubs at an equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rubbing {
@@ -98,7 +78,7 @@ impl Wall<'_> {
     /// Finds the equilibrium under `load` with friction of the coefficient `coefficient` besides.
     ///
     /// # Errors
-    /// [`FrictionError`].
+    /// [`EquilibriumError`].
     pub fn solve_with_friction(
         &self,
         load: &Load,
@@ -106,7 +86,7 @@ impl Wall<'_> {
         positions: Vec<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
-    ) -> Result<(Equilibrium, Rubbing), FrictionError> {
+    ) -> Result<(Equilibrium, Rubbing), EquilibriumError> {
         let found = self.solve_gripped(load, coefficient, &Grip::default(), positions, workspace, progress);
         found.map(|(equilibrium, rubbing, _)| (equilibrium, rubbing))
     }
@@ -114,7 +94,7 @@ impl Wall<'_> {
     /// As [`Wall::solve_with_friction`], after motions that left the needle with `grip`; the grip that this one leaves.
     ///
     /// # Errors
-    /// [`FrictionError`].
+    /// [`EquilibriumError`].
     pub fn solve_gripped(
         &self,
         load: &Load,
@@ -123,13 +103,13 @@ impl Wall<'_> {
         positions: Vec<f64>,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
-    ) -> Result<(Equilibrium, Rubbing, Grip), FrictionError> {
+    ) -> Result<(Equilibrium, Rubbing, Grip), EquilibriumError> {
         let before =
             grip.holds().then(|| self.solve_as_before(load, coefficient, grip, &positions, workspace, progress));
         let is_warm = matches!(before, Some(Ok(_)));
         let (mut found, lost) = match before {
             Some(Ok(found)) => (found, 0),
-            Some(Err(stop @ NewtonError::Interrupted { .. })) => return Err(stop.into()),
+            Some(Err(stop)) if stop.is_interrupted() => return Err(stop),
             Some(Err(failure)) => (self.solve(load, positions, workspace, progress)?, failure.iterations()),
             None => (self.solve(load, positions, workspace, progress)?, 0),
         };
@@ -191,13 +171,13 @@ impl Wall<'_> {
                 widening = (widening * NARROWING).max(1.0);
             }
         }
-        Err(FrictionError::NotSettled { rounds: MAX_ROUNDS, change, allowed: SETTLED })
+        Err(EquilibriumError::NotSettled { rounds: MAX_ROUNDS, change, allowed: SETTLED })
     }
 
     /// The equilibrium under the pressures that the last motion left, from which the new pressures are not far.
     ///
     /// # Errors
-    /// [`NewtonError`]: then the frictionless equilibrium is the start, as of a first motion.
+    /// [`EquilibriumError`]: then the frictionless equilibrium is the start, as of a first motion.
     fn solve_as_before(
         &self,
         load: &Load,
@@ -206,7 +186,7 @@ impl Wall<'_> {
         positions: &[f64],
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
-    ) -> Result<Equilibrium, NewtonError> {
+    ) -> Result<Equilibrium, EquilibriumError> {
         let tip = Vector3::from_row_slice(&positions[3 * self.topology.needle()..]);
         let points = self.rubbing_points(&self.approach(load, grip, &tip), coefficient, grip.pressed());
         let friction = Friction { faces: &self.faces, points: &points, full_slip_mm: FULL_SLIP_MM };

@@ -175,6 +175,7 @@ impl Question<'_> {
                 ..self.tool
             },
             motion: self.motion,
+            bears_strain: self.puncture_limits().strain,
             solid: decision.solid,
             friction_coefficient: decision.friction.then_some(self.prepared.scene.friction_coefficient),
             pressure_kpa,
@@ -192,14 +193,7 @@ impl Question<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
-        let over_fluid;
-        let resolution = match decision.bleb {
-            true => {
-                over_fluid = resolution.over_fluid();
-                &over_fluid
-            }
-            false => resolution,
-        };
+        let resolution = &resolved(resolution, decision);
         let topology = shared_topology(resolution.division(&self.prepared.scene.tissue, decision.parts()))?;
         let (_, solver) = match &mut workspace.coarse {
             Some(kept) if Arc::ptr_eq(&kept.0, &topology) => kept,
@@ -224,6 +218,7 @@ impl Question<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<FiniteElementAnswer, PredictError> {
+        let resolution = &resolved(resolution, decision);
         let coarse = self.coarse(&COARSE, linear, decision, change_kpa, workspace, progress)?;
         let topology = shared_topology(resolution.division(&self.prepared.scene.tissue, decision.parts()))?;
         let mut solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
@@ -364,4 +359,9 @@ impl Question<'_> {
             warnings,
         }
     }
+}
+
+/// How finely what is decided is computed by a level that computes as finely as `resolution`.
+fn resolved(resolution: &Resolution, decision: &Decision) -> Resolution {
+    if decision.bleb { resolution.over_fluid() } else { *resolution }
 }

@@ -7,7 +7,7 @@ use super::over_fluid::around_bleb;
 use super::types::{ContactReport, ContactState, PredictError, SolverReport};
 use crate::effects::pressure::Pressure;
 use crate::equilibrium::bleb::Bleb;
-use crate::equilibrium::friction::{FrictionError, Rubbing};
+use crate::equilibrium::friction::Rubbing;
 use crate::equilibrium::settled::Settled;
 use crate::equilibrium::{
     Addition, ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Strains, Tool, Wall,
@@ -70,13 +70,13 @@ pub const COARSE: Resolution = Resolution {
 /// Level `reference`.
 pub const REFERENCE: Resolution = Resolution {
     core_cells: 3,
-    rings: 12,
+    rings: 8,
     retina_elements: 3,
     choroid_elements: 1,
     sclera_elements: 1,
     core_per_contact: 1.0,
     rim_mm: 2.0,
-    ring_grading: 1.0,
+    ring_grading: 1.25,
     contact: ContactSettings {
         stiffness_kpa_per_mm: 3e5,
         smoothing_mm: 2e-4,
@@ -87,9 +87,9 @@ pub const REFERENCE: Resolution = Resolution {
 };
 
 impl Resolution {
-    /// As fine as a detached disc needs at least: three rings within its edge and three around it.
+    /// As fine as a detached disc needs: half as many rings again, for half of them end at its edge and the others begin there.
     pub fn over_fluid(&self) -> Resolution {
-        Resolution { rings: self.rings.max(6), ..*self }
+        Resolution { rings: self.rings + self.rings / 2, ..*self }
     }
 
     /// The mesh division for `tissue`; with an interface under the retina if it is `parting`.
@@ -178,6 +178,8 @@ pub struct Problem<'a> {
     pub tool: Tool<'a>,
     /// How it is driven.
     pub motion: Motion,
+    /// |principal stretch − 1| that the tissue bears.
+    pub bears_strain: f64,
     /// Which solid energy.
     pub solid: Solid,
     /// Coulomb's coefficient, where friction is simulated.
@@ -242,12 +244,8 @@ impl Problem<'_> {
         let (equilibrium, rubbing) = match self.friction_coefficient {
             None => (wall.solve(&load, positions, workspace, progress).map_err(failed)?, None),
             Some(coefficient) => {
-                let (equilibrium, rubbing) = wall
-                    .solve_with_friction(&load, coefficient, positions, workspace, progress)
-                    .map_err(|cause| match cause {
-                        FrictionError::Newton(cause) => failed(cause),
-                        cause @ FrictionError::NotSettled { .. } => PredictError::Friction { level, cause },
-                    })?;
+                let (equilibrium, rubbing) =
+                    wall.solve_with_friction(&load, coefficient, positions, workspace, progress).map_err(failed)?;
                 (equilibrium, Some(rubbing))
             }
         };
@@ -289,6 +287,7 @@ impl Problem<'_> {
             self.contact(resolution),
             self.tool,
         )?;
+        wall.puncture_at(self.bears_strain);
         if let (Some(settled), Some(pressure_kpa)) = (self.settled(resolution), self.pressure_kpa) {
             wall.settle(&self.patch.surface, &settled, pressure_kpa);
         }

@@ -12,10 +12,11 @@ use super::types::{EffectChoice, EffectReport, Level, PredictError, Prediction};
 use crate::effects::{contact, friction, tool_flex};
 use crate::equilibrium::Motion;
 use crate::equilibrium::bleb::{Bleb, compliance, middle_mm};
+use crate::equilibrium::error::EquilibriumError;
 use crate::mesh::disc::DiscGeometry;
 use crate::progress::Progress;
 use crate::scene::bleb::{Filling, SubretinalFluid};
-use crate::solve::newton::{NewtonError, Workspace};
+use crate::solve::newton::Workspace;
 
 /// Least distance of a bleb from the rim, in its radii.
 const BLEB_TO_RIM: f64 = 0.6;
@@ -125,11 +126,9 @@ impl Question<'_> {
 
 impl Problem<'_> {
     /// The error of a solve without an equilibrium.
-    pub(super) fn failed(&self, level: &'static str, cause: NewtonError) -> PredictError {
+    pub(super) fn failed(&self, level: &'static str, cause: EquilibriumError) -> PredictError {
         match &self.bleb {
-            Some(bleb) if !matches!(cause, NewtonError::Interrupted { .. }) => {
-                PredictError::Bleb { level, held: bleb.held(), cause }
-            }
+            Some(bleb) if !cause.is_interrupted() => PredictError::Bleb { level, held: bleb.held(), cause },
             _ => PredictError::Solver { level, cause },
         }
     }

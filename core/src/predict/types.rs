@@ -4,13 +4,12 @@ use nalgebra::{Point3, Vector3};
 use thiserror::Error;
 
 use super::expected_error::ExpectedError;
-use crate::equilibrium::friction::FrictionError;
+use crate::equilibrium::error::EquilibriumError;
 use crate::mesh::wall::WallError;
 use crate::needle::Needle;
 use crate::network::weights::WeightsError;
 use crate::patch::PatchError;
 use crate::range::OutOfRange;
-use crate::solve::newton::NewtonError;
 
 /// How accurate, and at what cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -279,15 +278,7 @@ pub enum PredictError {
         /// The level.
         level: &'static str,
         /// The last attempt's failure.
-        cause: NewtonError,
-    },
-    /// Friction was not found.
-    #[error("no equilibrium at level `{level}`: {cause}")]
-    Friction {
-        /// The level.
-        level: &'static str,
-        /// What failed.
-        cause: FrictionError,
+        cause: EquilibriumError,
     },
     /// The detached disc does not lie under the patch.
     #[error(
@@ -323,7 +314,7 @@ pub enum PredictError {
         /// What was held of the fluid.
         held: String,
         /// The last attempt's failure.
-        cause: NewtonError,
+        cause: EquilibriumError,
     },
     /// The level's network cannot be used.
     #[error("level `{level}`: {cause}")]

@@ -9,7 +9,7 @@ use super::history::History;
 use super::plan::{fits, outside, pressed};
 use super::{Laid, Settled, Simulation, Step};
 use crate::effects::pressure::Pressure;
-use crate::equilibrium::friction::{FrictionError, Rubbing};
+use crate::equilibrium::friction::Rubbing;
 use crate::equilibrium::grip::Grip;
 use crate::equilibrium::{Addition, Equilibrium, Load, MeshSize, Motion, Wall};
 use crate::mesh::wall::Place;
@@ -254,10 +254,7 @@ impl Simulation<'_> {
             None => solve(load.additions),
         };
         let level = self.sequence.level.name();
-        found.map_err(|cause| match cause {
-            FrictionError::Newton(cause) => PredictError::Solver { level, cause },
-            cause @ FrictionError::NotSettled { .. } => PredictError::Friction { level, cause },
-        })
+        found.map_err(|cause| PredictError::Solver { level, cause })
     }
 
     /// Positions to start from.

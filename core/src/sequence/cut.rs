@@ -7,6 +7,7 @@
 use nalgebra::Vector3;
 
 use super::{Simulation, Step};
+use crate::equilibrium::error::EquilibriumError;
 use crate::predict::{PredictError, Prediction};
 use crate::progress::Progress;
 use crate::solve::newton::NewtonError;
@@ -83,10 +84,10 @@ impl Simulation<'_> {
 /// Whether the equilibrium was not found, and might be by smaller parts.
 fn is_unsettled(failure: &PredictError) -> bool {
     match failure {
-        PredictError::Solver { cause, .. } => {
+        PredictError::Solver { cause: EquilibriumError::Newton(cause), .. } => {
             matches!(cause, NewtonError::NotConverged { .. } | NewtonError::NoStep { .. })
         }
-        PredictError::Friction { .. } => true,
+        PredictError::Solver { cause: EquilibriumError::NotSettled { .. } | EquilibriumError::Torn { .. }, .. } => true,
         _ => false,
     }
 }

@@ -226,7 +226,7 @@ pub(super) fn plan<'a>(
     let (mut before_s, mut load_before) = (0.0, None);
     for (index, step) in sequence.steps.iter().enumerate() {
         if progress.interrupted() {
-            let cause = NewtonError::Interrupted { iterations: 0 };
+            let cause = NewtonError::Interrupted { iterations: 0 }.into();
             return Err(at(index, PredictError::Solver { level: sequence.level.name(), cause }));
         }
         let request = sequence.request(step, &needle);

@@ -40,6 +40,8 @@ pub struct NewtonSettings {
     pub tolerance_mn: f64,
     /// Largest number of iterations.
     pub max_iterations: usize,
+    /// Largest number of those whose Hessian was not positive definite: a body that keeps giving way comes to rest far from where it began, if at all.
+    pub max_weakened: usize,
     /// Largest travel of the driven vertex in one iteration (mm).
     pub max_travel_mm: f64,
 }
@@ -211,13 +213,14 @@ impl System<'_> {
         progress: &mut dyn Progress,
     ) -> Result<NewtonReport, NewtonError> {
         let mut report = NewtonReport::default();
+        let mut weakenings = 0;
         let mut trial = Trial::new(self, positions, drive, settings, workspace);
         report.residual_mn = self.residual(positions, drive, workspace);
         if !report.residual_mn.is_finite() {
             return Err(self.bad_start(positions, &mut workspace.scratch));
         }
         while report.residual_mn > settings.tolerance_mn {
-            if report.iterations >= settings.max_iterations {
+            if report.iterations >= settings.max_iterations || weakenings > settings.max_weakened {
                 return Err(NewtonError::NotConverged {
                     iterations: report.iterations,
                     residual_mn: report.residual_mn,
@@ -229,6 +232,7 @@ impl System<'_> {
             }
             let weakened = self.factorize_definite(positions, &mut trial, workspace)?;
             report.shifts += weakened;
+            weakenings += usize::from(weakened > 0);
             let (plain, slope) = self.step(drive, settings.max_travel_mm, workspace)?;
             report.iterations += 1;
             if let Some(&change) = plain.get(self.dofs.free + 3) {

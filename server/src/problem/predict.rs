@@ -7,7 +7,6 @@ use retina_core::mesh::wall::WallError;
 use retina_core::patch::{CONTACT_DISTANCE_LIMIT_MM, PatchError};
 use retina_core::predict::PredictError;
 use retina_core::range::OutOfRange;
-use retina_core::solve::newton::NewtonError;
 use serde_json::{Value, json};
 
 use super::{Kind, Problem};
@@ -118,13 +117,12 @@ pub fn from_predict(error: PredictError) -> Problem {
             detail,
         ),
         PredictError::Mesh(error @ WallError::Linear(_)) => Problem::internal(error),
-        PredictError::Solver { cause: NewtonError::Interrupted { .. }, .. } => {
+        PredictError::Solver { cause, .. } if cause.is_interrupted() => {
             Problem::new(Kind::TookTooLong, "The work was stopped at the time limit of the server.")
         }
-        PredictError::Solver { .. }
-        | PredictError::Friction { .. }
-        | PredictError::Bleb { .. }
-        | PredictError::Linear(_) => Problem::new(Kind::NoEquilibrium, detail),
+        PredictError::Solver { .. } | PredictError::Bleb { .. } | PredictError::Linear(_) => {
+            Problem::new(Kind::NoEquilibrium, detail)
+        }
     }
 }
 

@@ -44,7 +44,7 @@ impl Contestant {
 
 /// Coarse meshes by cells of the core, rings around it, and elements through the retina; the last two have the reference's sclera and contact.
 const MESHES: [(usize, usize, usize, bool); 6] =
-    [(1, 2, 1, false), (1, 3, 1, false), (1, 6, 1, false), (2, 6, 2, false), (2, 8, 2, true), (3, 10, 2, true)];
+    [(1, 2, 1, false), (1, 3, 1, false), (1, 6, 1, false), (2, 6, 2, false), (2, 6, 2, true), (2, 8, 3, true)];
 /// Residuals at which Newton's method stops, relative to the force.
 const TOLERANCES: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-5];
 /// Contact stiffnesses over that of `coarse`.

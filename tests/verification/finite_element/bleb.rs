@@ -277,6 +277,7 @@ fn a_line_search_finds_the_pressure_that_full_steps_find() {
             force_scale_mn: 0.01,
             tolerance_mn: 1e-9,
             max_iterations: 60,
+            max_weakened: 60,
             max_travel_mm: 1.0,
         };
         let mut positions = wall.start();

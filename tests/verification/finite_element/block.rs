@@ -376,6 +376,7 @@ impl<'a> Body<'a> {
             force_scale_mn,
             tolerance_mn: tolerance * force_scale_mn,
             max_iterations: 50,
+            max_weakened: 50,
             max_travel_mm: 1.0,
         };
         self.with_terms(|terms| {

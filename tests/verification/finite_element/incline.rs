@@ -96,6 +96,7 @@ fn lean(coefficient: f64, tangent: f64) -> Result<(Vector3<f64>, Vector3<f64>), 
             force_scale_mn: NORMAL_MN,
             tolerance_mn: 1e-7 * NORMAL_MN,
             max_iterations: 60,
+            max_weakened: 60,
             max_travel_mm: 1.0,
         };
         let mut workspace = Workspace::new(pattern, symbolic);

@@ -82,6 +82,7 @@ impl Sphere {
             force_scale_mn: pressure_kpa.abs(),
             tolerance_mn: 1e-7 * pressure_kpa.abs(),
             max_iterations: 40,
+            max_weakened: 40,
             max_travel_mm: 1.0,
         };
         let mut workspace = Workspace::new(pattern, symbolic);

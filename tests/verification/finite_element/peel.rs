@@ -83,6 +83,7 @@ fn peel_force(fracture_energy: f64) -> f64 {
             force_scale_mn: fracture_energy * WIDTH_MM,
             tolerance_mn: 1e-5 * fracture_energy * WIDTH_MM,
             max_iterations: 300,
+            max_weakened: 300,
             max_travel_mm: 1.0,
         };
         system.solve(&mut positions, Drive::Held, &settings, &mut workspace, &mut Silent).expect("an equilibrium");

@@ -85,6 +85,7 @@ impl Column {
             force_scale_mn: 1e-3,
             tolerance_mn: 1e-12,
             max_iterations: 50,
+            max_weakened: 50,
             max_travel_mm: 1.0,
         };
         let mut positions = momentum.positions().to_vec();
