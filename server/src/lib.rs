@@ -18,6 +18,7 @@ mod body;
 mod catalog;
 pub mod cli;
 pub mod config;
+mod date;
 mod handlers;
 pub mod igtl;
 mod kserve;

@@ -7,11 +7,11 @@
 //! Not here: what the jobs compute, and what they are expected to take (`times`).
 
 mod load;
+mod queue;
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -22,6 +22,7 @@ use tokio::time::sleep;
 use tracing::Span;
 
 pub use load::Load;
+use queue::Queue;
 
 type Job = Box<dyn FnOnce(&mut Workspace) -> Done + Send>;
 
@@ -53,7 +54,7 @@ pub struct Ticket {
 
 /// The threads, as seen from those that talk. They end when this is dropped and the queue is empty.
 pub struct Pool {
-    jobs: SyncSender<(Ticket, Job)>,
+    jobs: Arc<Queue<(Ticket, Job)>>,
     load: Arc<Load>,
 }
 
@@ -83,19 +84,16 @@ impl Pool {
     ) -> io::Result<Self> {
         let threads = threads.max(1);
         let load = Arc::new(Load::new(threads));
-        let (sender, receiver) = sync_channel::<(Ticket, Job)>(queue);
-        let receiver = Arc::new(Mutex::new(receiver));
+        let jobs = Arc::new(Queue::new(queue));
         let mut first: Option<Job> = Some(Box::new(|workspace: &mut Workspace| {
             first(workspace);
             NOTHING
         }));
         for index in 0..threads {
-            let (receiver, load, first) = (Arc::clone(&receiver), Arc::clone(&load), first.take());
-            thread::Builder::new()
-                .name(format!("numerics-{index}"))
-                .spawn(move || work(first, &receiver, &load, index))?;
+            let (jobs, load, first) = (Arc::clone(&jobs), Arc::clone(&load), first.take());
+            thread::Builder::new().name(format!("numerics-{index}")).spawn(move || work(first, &jobs, &load, index))?;
         }
-        Ok(Self { jobs: sender, load })
+        Ok(Self { jobs, load })
     }
 
     /// What waits and what is at work.
@@ -170,29 +168,32 @@ impl Pool {
             return Err(PoolError::TooLate(expected));
         }
         let span = Span::current();
-        let job = Box::new(move |workspace: &mut Workspace| span.in_scope(|| job(workspace)));
+        let job: Job = Box::new(move |workspace: &mut Workspace| span.in_scope(|| job(workspace)));
         // Counted before it is taken, so that the count is never below zero.
         self.load.queued(ticket, 1);
-        self.jobs.try_send((ticket, job)).map_err(|error| {
+        if !self.jobs.put((ticket, job)) {
             self.load.queued(ticket, -1);
-            match error {
-                TrySendError::Full(_) => PoolError::Full(expected),
-                TrySendError::Disconnected(_) => PoolError::Panicked,
-            }
-        })
+            return Err(PoolError::Full(expected));
+        }
+        Ok(())
     }
 }
 
-fn work(first: Option<Job>, queue: &Mutex<Receiver<(Ticket, Job)>>, load: &Load, index: usize) {
+impl Drop for Pool {
+    fn drop(&mut self) {
+        self.jobs.close();
+    }
+}
+
+fn work(first: Option<Job>, jobs: &Queue<(Ticket, Job)>, load: &Load, index: usize) {
     let mut workspace = Workspace::default();
     let mut next = first;
     loop {
         let taken = next.take().map(|job| (Ticket::default(), job)).or_else(|| {
-            let queue = queue.lock().unwrap_or_else(PoisonError::into_inner);
-            let (ticket, job) = queue.recv().ok()?;
-            load.queued(ticket, -1);
-            load.begun(index, ticket);
-            Some((ticket, job))
+            jobs.take(|&(ticket, _)| {
+                load.queued(ticket, -1);
+                load.begun(index, ticket);
+            })
         });
         let Some((ticket, job)) = taken else { return };
         let began = Instant::now();

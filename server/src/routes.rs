@@ -4,11 +4,12 @@ use std::any::Any;
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::http::{HeaderName, Request, Response};
+use axum::http::{HeaderName, Request, Response, header};
 use axum::routing::get;
 use axum::{Json, Router, middleware};
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
+use tower_http::set_header::SetResponseHeaderLayer;
 use tower_http::trace::TraceLayer;
 use tracing::{Span, field};
 use utoipa::OpenApi;
@@ -17,6 +18,7 @@ use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
 use crate::access;
+use crate::date;
 use crate::handlers;
 use crate::kserve;
 use crate::log;
@@ -83,6 +85,7 @@ pub fn app(state: AppState) -> Router {
         .layer(middleware::from_fn_with_state(metrics, metrics::count));
     let routes = if access.origins.is_empty() { routes } else { routes.layer(access.cors()) };
     routes
+        .layer(SetResponseHeaderLayer::overriding(header::DATE, date::now))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
         .layer(trace)
         .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))

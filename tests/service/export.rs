@@ -12,7 +12,7 @@ use retina_tests::spawned::Spawned;
 use crate::harness::agent;
 
 /// A collector on a free port: its address, and each request as its first line and its body.
-fn collector() -> (String, Receiver<(String, Vec<u8>)>) {
+pub fn collector() -> (String, Receiver<(String, Vec<u8>)>) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("port");
     let address = format!("http://{}", listener.local_addr().expect("address"));
     let (sender, received) = channel();
@@ -45,7 +45,7 @@ fn collector() -> (String, Receiver<(String, Vec<u8>)>) {
     (address, received)
 }
 
-fn contains(body: &[u8], part: &[u8]) -> bool {
+pub fn contains(body: &[u8], part: &[u8]) -> bool {
     body.windows(part.len()).any(|window| window == part)
 }
 

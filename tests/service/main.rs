@@ -12,6 +12,7 @@ mod behind_nginx;
 mod budgets;
 mod catalog;
 mod clients;
+mod clock;
 mod export;
 mod faults;
 mod fuzzed;

@@ -1,6 +1,6 @@
 //! Scenes of one's own: stored, used, listed, deleted.
 
-mod durable;
+pub mod durable;
 mod forms;
 mod full;
 

@@ -1,4 +1,5 @@
-//! Clients that ask over HTTP/1.1, each on a connection of its own, and wait for every answer: how many come a second, and how long each takes.
+//! Clients that ask over HTTP/1.1, each on a connection of its own, as fast as they are answered or on a schedule: how many answers come a second, and how
+//! long each takes.
 //!
 //! The client is a few lines over a socket, so that what is measured is the service: it writes a request in one piece and reads an answer by its
 //! `content-length`.
@@ -9,6 +10,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use retina_core::comparison::quantile;
+
+/// Until the first request, so that every connection is open by then.
+const CONNECTING: Duration = Duration::from_millis(20);
 
 /// What came back in a turn.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -89,24 +93,46 @@ impl Client {
     }
 }
 
+/// When the next request of a connection is sent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pace {
+    /// When the answer before it is there: the service sets the pace, and each answer's time counts from its request.
+    Answered,
+    /// At its place in a schedule of so many a second over all connections, whatever is answered; where the answer before it is late, as soon as that is
+    /// there. The time counts from the place in the schedule, so a service that stops for a moment is charged with every request that would have come
+    /// in that moment.
+    Scheduled(f64),
+}
+
 /// Asks for `turn` over so many connections; every request is the next of these, round and round.
 ///
 /// # Errors
 /// Those of the sockets, and an answer whose status is not 200.
-pub fn measure(address: SocketAddr, requests: &[Vec<u8>], connections: usize, turn: Duration) -> io::Result<Measured> {
-    let (began, before) = (Instant::now(), cpu_seconds());
+pub fn measure(
+    address: SocketAddr,
+    requests: &[Vec<u8>],
+    connections: usize,
+    turn: Duration,
+    pace: Pace,
+) -> io::Result<Measured> {
+    let (began, before) = (Instant::now() + CONNECTING, cpu_seconds());
     let one = |first: usize| -> io::Result<Vec<f64>> {
         let (mut client, mut body, mut times_ms) = (Client::connect(address)?, Vec::new(), Vec::new());
-        for request in requests.iter().cycle().skip(first) {
-            if began.elapsed() >= turn {
+        thread::sleep(began.saturating_duration_since(Instant::now()));
+        for (index, request) in requests.iter().cycle().skip(first).enumerate() {
+            let due = match pace {
+                Pace::Answered => began.elapsed(),
+                Pace::Scheduled(a_second) => Duration::from_secs_f64((first + index * connections) as f64 / a_second),
+            };
+            if due >= turn {
                 break;
             }
-            let sent = Instant::now();
+            thread::sleep(due.saturating_sub(began.elapsed()));
             let status = client.ask(request, &mut body)?;
             if status != 200 {
                 return Err(io::Error::other(format!("{status}: {}", String::from_utf8_lossy(&body))));
             }
-            times_ms.push(sent.elapsed().as_secs_f64() * 1e3);
+            times_ms.push((began.elapsed() - due).as_secs_f64() * 1e3);
         }
         Ok(times_ms)
     };

@@ -19,7 +19,16 @@ impl Spawned {
     /// # Errors
     /// If it cannot be started, or ends before it listens; then its last line is in the error.
     pub fn start(program: &Path, arguments: &[&str]) -> io::Result<Self> {
+        Self::start_among(&[], program, arguments)
+    }
+
+    /// As [`Spawned::start`], with these variables in the environment.
+    ///
+    /// # Errors
+    /// As [`Spawned::start`].
+    pub fn start_among(variables: &[(&str, &str)], program: &Path, arguments: &[&str]) -> io::Result<Self> {
         let mut child = Command::new(program)
+            .envs(variables.iter().copied())
             .args(["--listen", "127.0.0.1:0", "--log", "json"])
             .args(arguments)
             .stderr(Stdio::piped())

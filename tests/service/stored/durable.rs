@@ -12,16 +12,16 @@ use crate::harness::{Running, request, with};
 use crate::stored::{call, id, prepared, shifted};
 
 /// A folder that is removed when dropped.
-struct Folder(PathBuf);
+pub struct Folder(pub PathBuf);
 
 impl Folder {
-    fn new(name: &str) -> Self {
+    pub fn new(name: &str) -> Self {
         let path = std::env::temp_dir().join(format!("retina-{}-{name}", std::process::id()));
         let _ = fs::remove_dir_all(&path);
         Self(path)
     }
 
-    fn text(&self) -> &str {
+    pub fn text(&self) -> &str {
         self.0.to_str().expect("UTF-8")
     }
 
@@ -116,17 +116,20 @@ fn what_is_not_what_was_given_is_told_and_never_used() {
 fn files_that_were_being_written_are_not_scenes_and_go_once_they_are_old() {
     let folder = Folder::new("leftovers");
     fs::create_dir_all(&folder.0).expect("folder");
-    let unfinished = |digit: &str, age_s: u64| {
+    let unfinished = |digit: &str, written: SystemTime| {
         let path = folder.0.join(format!("{}.json#1", digit.repeat(64)));
         fs::write(&path, "{\"surface\":").expect("written");
         let file = fs::File::options().write(true).open(&path).expect("file");
-        file.set_modified(SystemTime::now() - Duration::from_secs(age_s)).expect("time");
+        file.set_modified(written).expect("time");
         path
     };
-    let (old, young) = (unfinished("a", 3600), unfinished("b", 0));
+    let (now, hour) = (SystemTime::now(), Duration::from_secs(3600));
+    let (old, young) = (unfinished("a", now - hour), unfinished("b", now));
+    let of_a_time_to_come = unfinished("c", now + hour);
     let service = folder.serve();
     assert_eq!(call("GET", &service.url("/v1/scenes"), None).1["stored"], json!([]));
     assert!(!old.exists() && young.exists(), "a young one may be another server's at this moment");
+    assert!(!of_a_time_to_come.exists(), "written before the clock was set back, it would be young for as long");
 }
 
 /// A mesh of many vertices, so that writing it takes a while.
