@@ -1,5 +1,6 @@
 //! The commands: arguments in, files and tables out.
 
+pub mod ablation;
 pub mod calibrate;
 pub mod dataset;
 pub mod deformcontact;

@@ -2,6 +2,7 @@
 //!
 //! Read `errors` (how an error is measured) → `predictors` (who answers) → `baselines/*` → `tables` → `report`.
 
+pub mod ablation;
 pub mod baselines;
 pub mod coverage;
 pub mod errors;

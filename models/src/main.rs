@@ -17,6 +17,8 @@ struct Arguments {
 enum Command {
     /// Trains a network on a data set.
     Train(commands::train::Arguments),
+    /// Trains the variants of the paper's network alike and tabulates their errors.
+    Ablation(commands::ablation::Arguments),
     /// Prints and keeps every table about a data set and the networks.
     Evaluate(commands::evaluate::Arguments),
     /// Writes what the levels `linear` and `coarse` err by into the core.
@@ -36,6 +38,7 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Train(arguments) => commands::train::run(&arguments),
+        Command::Ablation(arguments) => commands::ablation::run(&arguments),
         Command::Evaluate(arguments) => commands::evaluate::run(&arguments),
         Command::Calibrate(arguments) => commands::calibrate::run(&arguments),
         Command::Dataset(arguments) => commands::dataset::run(&arguments),

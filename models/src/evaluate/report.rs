@@ -23,7 +23,7 @@ const NEEDLES: [(&str, f32); 3] = [("41G to 30G", 0.1555), ("30G to 25G", 0.257)
 /// Names of the tips.
 pub const TIPS: [&str; 3] = ["half balls", "flat tips", "bevels"];
 /// Batch of the published evaluation.
-const PUBLISHED_BATCH: usize = 4;
+pub const PUBLISHED_BATCH: usize = 4;
 
 /// Splits that are reported.
 const REPORTED: [Split; 3] = [Split::Test, Split::Hard, Split::Outside];
