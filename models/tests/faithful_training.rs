@@ -60,6 +60,10 @@ fn check_derivatives(backbone: Backbone) {
         let part = &gradient[tensor.range.clone()];
         let norm = part.iter().map(|&g| f64::from(g).powi(2)).sum::<f64>().sqrt();
         assert!(norm > 0.0, "{backbone:?} {}: no derivative", tensor.name);
+        // Where every sum lies on one side of GAT's kink its softmax takes `here` out: what is left is kinks alone, which the layer's own test steps around.
+        if tensor.name.ends_with(".here") || tensor.name.ends_with(".there") {
+            continue;
+        }
         let step = 2e-3;
         let moved = |sign: f64| {
             let mut parameters = parameters.clone();
@@ -104,7 +108,8 @@ fn attention_over_neighbours_is_derived_rightly() {
         part[range.clone()].copy_from_slice(&gradient[range]);
         parts.push(part);
     }
-    let step = 1e-2;
+    // Short enough that no sum passes the kink of the leaky ReLU.
+    let step = 1e-3;
     let check = |what: &str, norm: f64, difference: f64| {
         assert!(norm > 0.0, "{what}: no derivative");
         assert!((difference - norm).abs() < DERIVATIVE * norm, "{what}: {difference} by differences, {norm}");
