@@ -5,5 +5,6 @@ pub mod calibrate;
 pub mod dataset;
 pub mod deformcontact;
 pub mod evaluate;
+pub mod parity;
 pub mod train;
 pub mod truth_error;

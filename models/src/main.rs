@@ -25,6 +25,8 @@ enum Command {
     Calibrate(commands::calibrate::Arguments),
     /// Makes samples of random indentation paths; the same command again goes on where it stopped.
     Dataset(commands::dataset::Arguments),
+    /// Writes what the trainer computes layer by layer beside the weights.
+    Parity(commands::parity::Arguments),
     /// Prints how far the surface moves in a data set, and how far off the cheap answers are.
     DatasetReport(commands::dataset::ReportArguments),
     /// Measures how far the truth of the samples is from level `reference`, on random paths.
@@ -42,6 +44,7 @@ fn main() -> ExitCode {
         Command::Evaluate(arguments) => commands::evaluate::run(&arguments),
         Command::Calibrate(arguments) => commands::calibrate::run(&arguments),
         Command::Dataset(arguments) => commands::dataset::run(&arguments),
+        Command::Parity(arguments) => commands::parity::run(&arguments),
         Command::DatasetReport(arguments) => commands::dataset::run_report(&arguments),
         Command::TruthError(arguments) => commands::truth_error::run(&arguments),
         Command::ExportDeformcontact(arguments) => commands::deformcontact::run_export(&arguments),

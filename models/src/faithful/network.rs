@@ -15,6 +15,7 @@ use super::encoder::{Convolution, Encoded, Encoder, Mesh};
 use super::layers::{Attended, Dense, Head};
 use super::prepared::View;
 use super::variant::Backbone;
+use crate::train::layers::Layer;
 use crate::train::parameters::{Layout, draw};
 use crate::train::score::Score;
 
@@ -77,6 +78,21 @@ fn convolution(layout: &mut Layout, name: &str, inputs: usize, backbone: Backbon
             toward: ["here", "there"].map(|side| layout.add(&format!("{name}.{side}"), &[WIDTH])),
             inner: inputs,
         }),
+    }
+}
+
+impl Pass {
+    /// Every layer, as the core's observer is shown them.
+    pub fn layers(&self) -> Vec<Layer> {
+        let mut layers = Vec::new();
+        for (body, encoded) in [("soft", &self.soft), ("rigid", &self.rigid)] {
+            let convolved = encoded.layers.iter().enumerate();
+            layers.extend(convolved.map(|(at, layer)| Layer::new(body, at, WIDTH, &layer.out)));
+        }
+        layers.extend(self.heads.iter().enumerate().map(|(at, head)| Layer::new("head", at, WIDTH, &head.out)));
+        let decoded = self.rows[1..].iter().zip(DECODER).enumerate();
+        layers.extend(decoded.map(|(at, (rows, [_, outer]))| Layer::new("decoder", at, outer, rows)));
+        layers
     }
 }
 
