@@ -6,5 +6,6 @@ pub mod dataset;
 pub mod deformcontact;
 pub mod evaluate;
 pub mod parity;
+pub mod runtime;
 pub mod train;
 pub mod truth_error;

@@ -6,6 +6,8 @@ pub mod ablation;
 pub mod baselines;
 pub mod coverage;
 pub mod errors;
+pub mod onnx;
 pub mod predictors;
 pub mod report;
+pub mod runtime;
 pub mod tables;

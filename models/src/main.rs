@@ -29,6 +29,8 @@ enum Command {
     Parity(commands::parity::Arguments),
     /// Prints how far the surface moves in a data set, and how far off the cheap answers are.
     DatasetReport(commands::dataset::ReportArguments),
+    /// Prints what predictions cost, split into data and network, and the paper's network beside ONNX Runtime.
+    Runtime(commands::runtime::Arguments),
     /// Measures how far the truth of the samples is from level `reference`, on random paths.
     TruthError(commands::truth_error::Arguments),
     /// Writes a data set in the layout that the public DeformContact code reads.
@@ -46,6 +48,7 @@ fn main() -> ExitCode {
         Command::Dataset(arguments) => commands::dataset::run(&arguments),
         Command::Parity(arguments) => commands::parity::run(&arguments),
         Command::DatasetReport(arguments) => commands::dataset::run_report(&arguments),
+        Command::Runtime(arguments) => commands::runtime::run(&arguments),
         Command::TruthError(arguments) => commands::truth_error::run(&arguments),
         Command::ExportDeformcontact(arguments) => commands::deformcontact::run_export(&arguments),
         Command::ImportDeformcontact(arguments) => commands::deformcontact::run_import(&arguments),

@@ -83,7 +83,7 @@ fn the_core_computes_every_layer_as_the_trainer_did() {
         });
     }
     let network = FaithfulNetwork::new(&std::fs::read(path("faithful.safetensors")).unwrap()).unwrap();
-    let sample = shard::read(&path("contact.parity.safetensors")).unwrap()[0];
+    let sample = shard::read(&path("faithful.parity.safetensors")).unwrap()[0];
     let edges: Vec<_> = describe::graph().edges().collect();
     let mut view = View::default();
     Prepared::new(&sample).view(0, &mut view);

@@ -4,10 +4,13 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Args;
+use nalgebra::Vector3;
 use retina_core::network::contact::Start;
 use retina_core::network::faithful::NAME;
 
+use crate::data::Data;
 use crate::parity;
+use crate::sample::{Sample, Split};
 use crate::shard;
 use crate::train::checkpoint::write_whole;
 use crate::train::layers;
@@ -20,6 +23,14 @@ pub struct Arguments {
     /// Folder with the weights.
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,
+    /// Folder of a data set whose furthest moved validation sample becomes that of the paper's network; without, the one beside its weights stays.
+    #[arg(long)]
+    data: Option<PathBuf>,
+}
+
+/// Largest displacement of a sample (mm).
+fn largest_mm(sample: &Sample) -> f32 {
+    sample.truth.displacement_mm.iter().map(|u| Vector3::from(*u).norm()).fold(0.0, f32::max)
 }
 
 /// Writes `NAME.layers.safetensors` for each network.
@@ -37,8 +48,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         write_whole(&path(name, "layers."), &layers::write(&layers)?)?;
         println!("{name}: {} layers", layers.len());
     }
-    // The paper's network has no sample of its own.
-    let layers = parity::faithful(&std::fs::read(path(NAME, ""))?, &sample(Start::Linear.network())?)?;
+    if let Some(folder) = &arguments.data {
+        let data = Data::read(std::slice::from_ref(folder))?;
+        let furthest = data.of(Split::Validation).max_by(|a, b| largest_mm(a).total_cmp(&largest_mm(b)));
+        let furthest = furthest.ok_or("there is no validation sample")?;
+        shard::write(&path(NAME, "parity."), &[*furthest])?;
+    }
+    let layers = parity::faithful(&std::fs::read(path(NAME, ""))?, &sample(NAME)?)?;
     write_whole(&path(NAME, "layers."), &layers::write(&layers)?)?;
     println!("{NAME}: {} layers", layers.len());
     Ok(())
