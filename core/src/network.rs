@@ -17,6 +17,7 @@ pub mod graph;
 mod header;
 pub mod input;
 pub mod observer;
+pub mod packed;
 pub mod plain;
 pub mod projection;
 pub mod weights;

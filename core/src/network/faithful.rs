@@ -22,6 +22,7 @@ use nalgebra::Vector3;
 use super::dense::{Into, fill_rows, product, product_transposed};
 use super::input::Field;
 use super::observer::Observer;
+use super::packed::Packed;
 use super::weights::{Weights, WeightsError};
 use crate::patch::NODE_COUNT;
 use features::{RIGID, SOFT};
@@ -40,7 +41,7 @@ pub const UNIT_MM: f32 = 0.1;
 pub const NAME: &str = "faithful";
 
 struct Dense {
-    weight: Vec<f32>,
+    weight: Packed,
     bias: Vec<f32>,
 }
 
@@ -51,6 +52,8 @@ pub struct FaithfulNetwork {
     /// `W Wᵀ / √256` of each head: query times key in one matrix.
     heads: [Vec<f32>; HEADS],
     decoder: Vec<Dense>,
+    /// The patch's rows of the decoder's first layer; that layer above has the heads' rows.
+    first: Packed,
     tool: Propagation,
 }
 
@@ -108,9 +111,11 @@ impl FaithfulNetwork {
             folded.iter_mut().for_each(|x| *x /= (WIDTH as f32).sqrt());
             Ok(folded)
         };
-        let dense = |(at, [inner, outer]): (usize, [usize; 2])| -> Result<Dense, WeightsError> {
+        let decoder = |at: usize| weights.take(&format!("decoder.{at}.weight"), &DECODER[at]);
+        let dense = |(at, [_, outer]): (usize, [usize; 2])| -> Result<Dense, WeightsError> {
+            let patch = if at == 0 { WIDTH * outer } else { 0 };
             Ok(Dense {
-                weight: weights.take(&format!("decoder.{at}.weight"), &[inner, outer])?,
+                weight: Packed::new(&decoder(at)?[patch..], outer),
                 bias: weights.take(&format!("decoder.{at}.bias"), &[outer])?,
             })
         };
@@ -119,6 +124,7 @@ impl FaithfulNetwork {
             rigid: encoder("rigid", RIGID)?,
             heads: [head(0)?, head(1)?],
             decoder: DECODER.into_iter().enumerate().map(dense).collect::<Result<_, _>>()?,
+            first: Packed::new(&decoder(0)?[..WIDTH * DECODER[0][1]], DECODER[0][1]),
             tool: Propagation::new(TOOL_NODES, &tool::edges()),
         })
     }
@@ -144,10 +150,9 @@ impl FaithfulNetwork {
             product(&mut query, &soft, &self.heads[head], WIDTH, WIDTH, Into::Place);
             query
         });
-        let Dense { weight, bias } = &self.decoder[0];
         let mut first = vec![0.0; soft.len()];
-        fill_rows(&mut first, bias);
-        product(&mut first, &soft, &weight[..WIDTH * WIDTH], WIDTH, WIDTH, Into::Sum);
+        fill_rows(&mut first, &self.decoder[0].bias);
+        self.first.add_product(&mut first, &soft);
         EncodedPatch { queries, first }
     }
 
@@ -180,16 +185,15 @@ impl FaithfulNetwork {
             }
         }
         memory.rigid = rigid;
-        for (at, (dense, [inner, outer])) in self.decoder.iter().zip(DECODER).enumerate() {
+        for (at, (dense, [_, outer])) in self.decoder.iter().zip(DECODER).enumerate() {
             next.resize(NODE_COUNT * outer, 0.0);
             if at == 0 {
                 // The patch's part of the sum is known; what is left are the heads' rows.
                 next.copy_from_slice(&patch.first);
-                product(next, joined, &dense.weight[WIDTH * WIDTH..], HEADS * WIDTH, outer, Into::Sum);
             } else {
                 fill_rows(next, &dense.bias);
-                product(next, joined, &dense.weight, inner, outer, Into::Sum);
             }
+            dense.weight.add_product(next, joined);
             if at + 1 < DECODER.len() {
                 relu(next);
             }

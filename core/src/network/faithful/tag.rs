@@ -5,7 +5,8 @@
 use pulp::Arch;
 
 use super::WIDTH;
-use crate::network::dense::{Into, fill_rows, product};
+use crate::network::dense::fill_rows;
+use crate::network::packed::Packed;
 use crate::network::weights::{Weights, WeightsError};
 
 /// K: how far a node hears.
@@ -87,8 +88,7 @@ impl Propagation {
 
 /// One layer.
 pub struct TagConv {
-    inputs: usize,
-    weight: Vec<f32>,
+    weight: Packed,
     bias: Vec<f32>,
 }
 
@@ -99,8 +99,7 @@ impl TagConv {
     /// [`WeightsError`].
     pub fn new(weights: &Weights, name: &str, inputs: usize) -> Result<Self, WeightsError> {
         Ok(TagConv {
-            inputs,
-            weight: weights.take(&format!("{name}.weight"), &[(HOPS + 1) * inputs, WIDTH])?,
+            weight: Packed::new(&weights.take(&format!("{name}.weight"), &[(HOPS + 1) * inputs, WIDTH])?, WIDTH),
             bias: weights.take(&format!("{name}.bias"), &[WIDTH])?,
         })
     }
@@ -110,6 +109,6 @@ impl TagConv {
         mesh.hops(x, hops);
         out.resize(mesh.nodes() * WIDTH, 0.0);
         fill_rows(out, &self.bias);
-        product(out, hops, &self.weight, (HOPS + 1) * self.inputs, WIDTH, Into::Sum);
+        self.weight.add_product(out, hops);
     }
 }
