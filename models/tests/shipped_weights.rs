@@ -75,7 +75,8 @@ fn check_layers(name: &str, observe: impl FnOnce(&mut dyn FnMut(&str, usize, &[f
 fn the_core_computes_every_layer_as_the_trainer_did() {
     for start in [Start::Linear, Start::Coarse] {
         let name = start.network();
-        let network = ContactNetwork::new(start, &std::fs::read(path(&format!("{name}.safetensors"))).unwrap()).unwrap();
+        let network =
+            ContactNetwork::new(start, &std::fs::read(path(&format!("{name}.safetensors"))).unwrap()).unwrap();
         let sample = shard::read(&path(&format!("{name}.parity.safetensors"))).unwrap()[0];
         check_layers(name, |seen| {
             let mut memory = Memory::default();

@@ -311,7 +311,9 @@ fn damaged_weights_are_told_apart() {
 fn a_product_with_packed_weights_is_the_product() {
     let mut random = fastrand::Rng::with_seed(31);
     let mut draw = |count: usize| -> Vec<f32> { (0..count).map(|_| random.f32() - 0.5).collect() };
-    for (rows, inner, columns) in [(1, 5, 3), (2, 7, 16), (3, 1, 33), (4, 64, 40), (5, 9, 64), (6, 12, 8), (102, 25, 256)] {
+    for (rows, inner, columns) in
+        [(1, 5, 3), (2, 7, 16), (3, 1, 33), (4, 64, 40), (5, 9, 64), (6, 12, 8), (102, 25, 256)]
+    {
         let (x, w, before) = (draw(rows * inner), draw(inner * columns), draw(rows * columns));
         let mut out = before.clone();
         Packed::new(&w, columns).add_product(&mut out, &x);

@@ -162,13 +162,7 @@ impl FaithfulNetwork {
     }
 
     /// The same, layer by layer shown to `seen`.
-    pub fn predict_observed(
-        &self,
-        patch: &EncodedPatch,
-        tool: &[f32],
-        memory: &mut Memory,
-        seen: Observer,
-    ) -> Field {
+    pub fn predict_observed(&self, patch: &EncodedPatch, tool: &[f32], memory: &mut Memory, seen: Observer) -> Field {
         let mut rigid = std::mem::take(&mut memory.rigid);
         encode((&self.rigid, "rigid"), &self.tool, tool, memory, &mut rigid, seen);
         let Memory { scores, value, joined, next, .. } = memory;

@@ -13,8 +13,8 @@ use retina_core::network::graph::Graph;
 use retina_core::patch::NODE_COUNT;
 
 use super::prepared::Prepared;
-use crate::train::matrix::{add_product, add_product_transposed, add_row_sum, add_transposed_product};
 use crate::train::layers::Layer;
+use crate::train::matrix::{add_product, add_product_transposed, add_row_sum, add_transposed_product};
 use crate::train::parameters::{Layout, draw};
 
 /// The form of a network.

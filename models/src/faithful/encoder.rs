@@ -132,14 +132,7 @@ impl Encoder {
     }
 
     /// Adds to `gradient`, given the derivative by what `forward` answered.
-    pub fn backward(
-        &self,
-        parameters: &[f32],
-        mesh: &Mesh,
-        kept: &Encoded,
-        dout: Vec<f32>,
-        gradient: &mut [f32],
-    ) {
+    pub fn backward(&self, parameters: &[f32], mesh: &Mesh, kept: &Encoded, dout: Vec<f32>, gradient: &mut [f32]) {
         let dfirst = self.layers[1].backward(parameters, mesh, &kept.layers[1], dout, gradient);
         debug_assert_eq!(dfirst.len() % WIDTH, 0);
         self.layers[0].backward(parameters, mesh, &kept.layers[0], dfirst, gradient);

@@ -36,10 +36,8 @@ impl Layer {
 /// # Errors
 /// A width that does not divide a layer.
 pub fn write(layers: &[Layer]) -> Result<Vec<u8>, SafeTensorError> {
-    let kept: Vec<(usize, Vec<u8>)> = layers
-        .iter()
-        .map(|layer| (layer.width, layer.kept().iter().flat_map(|x| x.to_le_bytes()).collect()))
-        .collect();
+    let kept: Vec<(usize, Vec<u8>)> =
+        layers.iter().map(|layer| (layer.width, layer.kept().iter().flat_map(|x| x.to_le_bytes()).collect())).collect();
     let views: Vec<(&str, TensorView)> = layers
         .iter()
         .zip(&kept)
