@@ -21,8 +21,11 @@ const LEFT: f64 = 0.5;
 /// The goal on the default scene (µm), which other surfaces need not be exempt from: mean error of `network`.
 const GOAL_UM: f64 = 2.0;
 
-/// Height of a surface above the patch's plane (mm) at x, y (mm), by name.
-const SURFACES: [(&str, fn(f64, f64) -> f64); 3] = [
+/// Height of a surface above the patch's plane (mm) at x, y (mm).
+type Height = fn(f64, f64) -> f64;
+
+/// The surfaces by name.
+const SURFACES: [(&str, Height); 3] = [
     // Half axes of 14, 9 and 12 mm: radii of curvature of 16.3 and 6.8 mm at the apex.
     ("ellipsoid", |x, y| 12.0 * (1.0 - (1.0 - (x / 14.0).powi(2) - (y / 9.0).powi(2)).sqrt())),
     // Curved by 1/12 mm one way and as much the other way across.
@@ -35,7 +38,7 @@ const SURFACES: [(&str, fn(f64, f64) -> f64); 3] = [
 ];
 
 /// The cap's uneven vertices, lifted to another surface.
-fn scene(height: fn(f64, f64) -> f64) -> PreparedScene {
+fn scene(height: Height) -> PreparedScene {
     let (vertices, triangles) = cap();
     assert_eq!(vertices.len(), SIDE * SIDE);
     let vertices = vertices.into_iter().map(|v| Point3::new(v.x, v.y, height(v.x, v.y))).collect();
@@ -44,7 +47,7 @@ fn scene(height: fn(f64, f64) -> f64) -> PreparedScene {
 }
 
 /// A ball straight down, one that leans, and a flat tip: position (mm), radius (mm), lean (rad), force (mN).
-fn requests(height: fn(f64, f64) -> f64) -> [Request; 3] {
+fn requests(height: Height) -> [Request; 3] {
     let request = |shape: NeedleShape, [x, y]: [f64; 2], lean: f64, force_mn: f64| {
         let points = nalgebra::Unit::new_normalize(Vector3::new(lean.sin(), 0.0, -lean.cos()));
         let needle = Needle::pointing(shape, Point3::new(x, y, height(x, y) + 0.1), &points);

@@ -21,9 +21,8 @@ pub fn coverage(networks: &mut [Contact], splits: &[(Split, Vec<(&Sample, Input)
                 let quantiles = expected_error::quantiles(level, usize::from(sample.tip.kind), strain(sample));
                 let (Some(quantiles), Some(worst_um)) = (quantiles, worst_um(sample, level)) else { continue };
                 let depth_um = f64::from(sample.linear_depth_mm) * 1e3;
-                // `hard` and `outside` are what `retina_core::predict::sampled` does not call sampled.
                 let bounds_um = [quantiles.median, quantiles.p95].map(|ratio| ratio * depth_um);
-                tally.add(worst_um, bounds_um, !matches!(split, Split::Hard | Split::Outside));
+                tally.add(worst_um, bounds_um, sampled(*split));
             }
             text.push_str(&tally.row(&format!("`{}`", level.name()), *split));
         }
@@ -36,12 +35,17 @@ pub fn coverage(networks: &mut [Contact], splits: &[(Split, Vec<(&Sample, Input)
                 let truth = describe::answer(&sample.truth).displacement_mm;
                 let off = answer.answer.displacement_mm.iter().zip(&truth).map(|(a, t)| (a - t).norm());
                 let um = |mm: f32| f64::from(mm) * 1e3;
-                tally.add(um(off.fold(0.0, f32::max)), answer.error_mm.map(um), answer.known);
+                tally.add(um(off.fold(0.0, f32::max)), answer.error_mm.map(um), answer.known && sampled(*split));
             }
             text.push_str(&tally.row(&network.name(), *split));
         }
     }
     text
+}
+
+/// Whether `retina_core::predict::sampled` has the requests of a split: it does not have the outer fifths of `hard`, nor the needles and angles of `outside`.
+fn sampled(split: Split) -> bool {
+    !matches!(split, Split::Hard | Split::Outside)
 }
 
 /// How many errors stay below their median and their 95 % bound.
