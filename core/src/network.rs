@@ -16,6 +16,8 @@ pub mod features;
 pub mod graph;
 mod header;
 pub mod input;
+pub mod observer;
+pub mod packed;
 pub mod plain;
 pub mod projection;
 pub mod weights;

@@ -11,6 +11,7 @@ pub mod dataset;
 pub mod describe;
 pub mod evaluate;
 pub mod faithful;
+pub mod parity;
 pub mod sample;
 pub mod shard;
 pub mod train;

@@ -9,6 +9,7 @@ pub mod adam;
 pub mod card;
 pub mod checkpoint;
 pub mod export;
+pub mod layers;
 pub mod matrix;
 pub mod parameters;
 pub mod record;

@@ -1,12 +1,18 @@
 //! The weights that ship are those that their cards tell of, and answer in the core what the trainer computed.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use retina_core::network::contact::{ContactNetwork, Memory, Start};
+use retina_core::network::faithful::tag::Propagation;
+use retina_core::network::faithful::{self, FaithfulNetwork};
 use retina_core::network::weights::hash;
+use retina_core::patch::NODE_COUNT;
 use retina_models::describe;
+use retina_models::faithful::prepared::{Prepared, View};
 use retina_models::shard;
 use retina_models::train::card::Card;
+use retina_models::train::layers::{self, Layer};
 
 /// Two ways to compute the same in single precision, relative to the largest number.
 const F32_PARITY: f32 = 1e-5;
@@ -40,6 +46,55 @@ fn the_core_answers_what_the_cards_say() {
             }
         }
     }
+}
+
+/// Holds what `observe` is shown against the committed rows of `name`, layer by layer.
+fn check_layers(name: &str, observe: impl FnOnce(&mut dyn FnMut(&str, usize, &[f32]))) {
+    let mut committed: BTreeMap<String, (usize, Vec<f32>)> =
+        layers::read(&std::fs::read(path(&format!("{name}.layers.safetensors"))).unwrap())
+            .unwrap()
+            .into_iter()
+            .map(|(layer, width, rows)| (layer, (width, rows)))
+            .collect();
+    let count = committed.len();
+    observe(&mut |layer, at, rows| {
+        let (width, trainer) = committed.remove(&format!("{layer}.{at}")).unwrap();
+        let core = Layer::new(layer, at, width, rows).kept();
+        let largest = trainer.iter().fold(0.0_f32, |most, x| most.max(x.abs()));
+        assert!(core.len() == trainer.len() && largest > 0.0, "{name} {layer}.{at}: {} numbers", core.len());
+        let off = core.iter().zip(&trainer).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / largest;
+        println!("{name} {layer}.{at}: {off:.1e} of {largest}");
+        assert!(off < F32_PARITY, "{name} {layer}.{at}: off by {off:e} of {largest}");
+    });
+    assert!(committed.is_empty() && count >= 9, "{name}: {:?} of {count} were not shown", committed.keys());
+}
+
+/// The committed layers were computed by the trainer's own pass (`retina-models parity`), which shares neither the folded weights nor the kept parts
+/// of the core's.
+#[test]
+fn the_core_computes_every_layer_as_the_trainer_did() {
+    for start in [Start::Linear, Start::Coarse] {
+        let name = start.network();
+        let network =
+            ContactNetwork::new(start, &std::fs::read(path(&format!("{name}.safetensors"))).unwrap()).unwrap();
+        let sample = shard::read(&path(&format!("{name}.parity.safetensors"))).unwrap()[0];
+        check_layers(name, |seen| {
+            let mut memory = Memory::default();
+            network.predict_observed(&describe::input(&sample), &describe::graph(), &mut memory, seen).unwrap();
+        });
+    }
+    let network = FaithfulNetwork::new(&std::fs::read(path("faithful.safetensors")).unwrap()).unwrap();
+    let sample = shard::read(&path("faithful.parity.safetensors")).unwrap()[0];
+    let edges: Vec<_> = describe::graph().edges().collect();
+    let mut view = View::default();
+    Prepared::new(&sample).view(0, &mut view);
+    check_layers("faithful", |seen| {
+        let mut memory = faithful::Memory::default();
+        let mesh = Propagation::new(NODE_COUNT, &edges);
+        let rest = describe::input(&sample).rest_mm;
+        let patch = network.encode_patch_observed(&rest, &mesh, &mut memory, seen);
+        network.predict_observed(&patch, &view.rigid, &mut memory, seen);
+    });
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! anew. Not here: laws (`invariants`), truth about the reference itself (`verification`).
 
 mod samples;
+mod unseen;
 
 use std::collections::HashMap;
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::networks::Networks;
 use retina_core::predict::{Control, EffectChoice, Level, PredictError, PreparedScene, Request};
 use retina_core::scene::Scene;
@@ -178,6 +179,29 @@ fn without_usable_weights_the_other_levels_answer() {
     }
     let situation = built_in("macula").situation(&straight(Level::Network, 0.5)).unwrap();
     assert!(LEARNED.iter().all(|level| situation.has(*level) && situation.expected_error(*level).p95_um.is_finite()));
+}
+
+/// A needle that leans to 60° and is driven within 15° of its axis was sampled; one that leans or is driven further off was not.
+#[test]
+fn a_needle_beyond_the_training_is_answered_and_flagged() {
+    let scene = built_in("flat");
+    let request = |tilt_deg: f64, lean_deg: f64| {
+        let along = |deg: f64| {
+            let (sin, cos) = deg.to_radians().sin_cos();
+            nalgebra::Unit::new_normalize(Vector3::new(sin, 0.0, -cos))
+        };
+        let tip = Point3::new(0.0, 0.0, 0.1);
+        let needle = Needle::pointing(NeedleShape::hemispherical(0.2), tip, &along(tilt_deg));
+        let control = Control::Force(along(tilt_deg + lean_deg).into_inner() * 0.2);
+        Request { needle, control, level: Level::Network, effects: EffectChoice::Auto }
+    };
+    for level in [Level::Linear, Level::Network] {
+        let calibrated = |tilt_deg, lean_deg| {
+            ask(&scene, &at(&request(tilt_deg, lean_deg), level)).unwrap().expected_error.calibrated
+        };
+        assert!(calibrated(0.0, 0.0) && calibrated(0.0, 14.0) && calibrated(58.0, 0.0), "{level:?}");
+        assert!(!calibrated(0.0, 17.0) && !calibrated(62.0, 0.0), "{level:?}");
+    }
 }
 
 #[test]

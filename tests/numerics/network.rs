@@ -9,6 +9,7 @@ use retina_core::network::contact::{ContactNetwork, Memory, Start};
 use retina_core::network::features::{BASIS, Features};
 use retina_core::network::graph::Graph;
 use retina_core::network::input::{Answer, Input, TissueNumbers};
+use retina_core::network::packed::Packed;
 use retina_core::network::plain::affine;
 use retina_core::network::weights::{HASH, NETWORK, Weights, WeightsError, hash};
 use retina_core::patch::{NODE_COUNT, Patch};
@@ -303,4 +304,23 @@ fn damaged_weights_are_told_apart() {
     data[..4].copy_from_slice(&f32::NAN.to_le_bytes());
     let expected = WeightsError::NotFinite { name: name.clone(), index: 0 };
     assert_eq!(read(&file(&broken, "contact")), Err(expected));
+}
+
+/// Against plain loops, for every number of rows that is left over and for columns that fill no panel.
+#[test]
+fn a_product_with_packed_weights_is_the_product() {
+    let mut random = fastrand::Rng::with_seed(31);
+    let mut draw = |count: usize| -> Vec<f32> { (0..count).map(|_| random.f32() - 0.5).collect() };
+    for (rows, inner, columns) in
+        [(1, 5, 3), (2, 7, 16), (3, 1, 33), (4, 64, 40), (5, 9, 64), (6, 12, 8), (102, 25, 256)]
+    {
+        let (x, w, before) = (draw(rows * inner), draw(inner * columns), draw(rows * columns));
+        let mut out = before.clone();
+        Packed::new(&w, columns).add_product(&mut out, &x);
+        let plain = affine(&x, &w, &vec![0.0; columns], inner);
+        for ((out, before), plain) in out.iter().zip(&before).zip(&plain) {
+            assert!((out - before - plain).abs() < SINGLE, "{rows} × {inner} × {columns}: {out} {before} {plain}");
+        }
+        assert_ne!(out, before);
+    }
 }

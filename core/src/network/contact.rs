@@ -21,6 +21,7 @@ use super::dense::{Into, fill_rows, product};
 use super::features::{BASIS, Features, SIDES};
 use super::graph::Graph;
 use super::input::{Answer, Field, Input};
+use super::observer::Observer;
 use super::projection;
 use super::weights::{Weights, WeightsError};
 use crate::patch::NODE_COUNT;
@@ -218,12 +219,23 @@ impl ContactNetwork {
 
     /// Corrects the answer that `input` brings; `None` where it lacks the one that this network starts from.
     pub fn predict(&self, input: &Input, graph: &Graph, memory: &mut Memory) -> Option<Corrected> {
+        self.predict_observed(input, graph, memory, &mut |_, _, _| {})
+    }
+
+    /// The same, layer by layer shown to `seen`.
+    pub fn predict_observed(
+        &self,
+        input: &Input,
+        graph: &Graph,
+        memory: &mut Memory,
+        seen: Observer,
+    ) -> Option<Corrected> {
         let coarse = match self.start {
             Start::Linear => None,
             Start::Coarse => Some(input.coarse.as_ref()?),
         };
         memory.features.describe(input, coarse);
-        self.forward(graph, memory);
+        self.forward(graph, memory, seen);
         let start = coarse.unwrap_or(&input.linear);
         let mut answer = self.assemble(input, start, memory);
         projection::out_of_needle(input, &mut answer);
@@ -240,7 +252,7 @@ impl ContactNetwork {
     }
 
     /// Coefficients into `memory.out`, the motion's numbers into `memory.motion`, the quantiles' logarithms into `memory.quantiles`.
-    fn forward(&self, graph: &Graph, memory: &mut Memory) {
+    fn forward(&self, graph: &Graph, memory: &mut Memory, seen: Observer) {
         let Memory { features, x, mean, sum, shared, out, pooled, motion, quantiles } = memory;
         let (width, size) = (self.width, NODE_COUNT * self.width);
         for buffer in [&mut *x, mean, sum] {
@@ -253,7 +265,8 @@ impl ContactNetwork {
         fill_rows(sum, shared);
         product(sum, &features.local, &self.local, features.local.len() / NODE_COUNT, width, Into::Sum);
         activate_all(x, sum);
-        for block in &self.blocks {
+        seen("input", 0, x);
+        for (at, block) in self.blocks.iter().enumerate() {
             fill_rows(sum, &block.bias);
             product(sum, x, &block.weight, width, width, Into::Sum);
             if let Some(message) = &block.message {
@@ -261,19 +274,24 @@ impl ContactNetwork {
                 product(sum, mean, message, width, width, Into::Sum);
             }
             add_activated(x, sum);
+            seen("block", at, x);
         }
         out.resize(NODE_COUNT * BASIS, 0.0);
         fill_rows(out, &self.out_bias);
         product(out, x, &self.out, width, BASIS, Into::Sum);
+        seen("output", 0, out);
         pooled.resize(width + globals, 0.0);
         product(&mut pooled[..width], &features.pool, x, NODE_COUNT, width, Into::Place);
         let standard = features.global.iter().zip(&self.global_mean).zip(&self.global_scale);
         for (to, ((number, mean), scale)) in pooled[width..].iter_mut().zip(standard) {
             *to = (number - mean) * scale;
         }
+        seen("pooled", 0, pooled);
         self.motion.forward(pooled, sum, motion);
         self.quantile.forward(pooled, sum, quantiles);
         quantiles.iter_mut().zip(&self.shift).for_each(|(quantile, shift)| *quantile += shift);
+        seen("motion", 0, motion);
+        seen("quantile", 0, quantiles);
     }
 
     /// Displacements, travel and reaction from what `forward` left.

@@ -21,6 +21,8 @@ use nalgebra::Vector3;
 
 use super::dense::{Into, fill_rows, product, product_transposed};
 use super::input::Field;
+use super::observer::Observer;
+use super::packed::Packed;
 use super::weights::{Weights, WeightsError};
 use crate::patch::NODE_COUNT;
 use features::{RIGID, SOFT};
@@ -39,7 +41,7 @@ pub const UNIT_MM: f32 = 0.1;
 pub const NAME: &str = "faithful";
 
 struct Dense {
-    weight: Vec<f32>,
+    weight: Packed,
     bias: Vec<f32>,
 }
 
@@ -50,7 +52,18 @@ pub struct FaithfulNetwork {
     /// `W Wᵀ / √256` of each head: query times key in one matrix.
     heads: [Vec<f32>; HEADS],
     decoder: Vec<Dense>,
+    /// The patch's rows of the decoder's first layer; that layer above has the heads' rows.
+    first: Packed,
     tool: Propagation,
+}
+
+/// What depends on the patch alone: it is computed once and kept.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EncodedPatch {
+    /// `S Wₕ Wₕᵀ / √256` of each head, 64 × 256.
+    queries: [Vec<f32>; HEADS],
+    /// S times its rows of the decoder's first layer, and that layer's bias, 64 × 256.
+    first: Vec<f32>,
 }
 
 /// Memory that one thread keeps between predictions.
@@ -59,8 +72,8 @@ pub struct Memory {
     hops: Vec<f32>,
     layer: Vec<f32>,
     rigid: Vec<f32>,
-    query: Vec<f32>,
     scores: Vec<f32>,
+    value: Vec<f32>,
     joined: Vec<f32>,
     next: Vec<f32>,
 }
@@ -98,9 +111,11 @@ impl FaithfulNetwork {
             folded.iter_mut().for_each(|x| *x /= (WIDTH as f32).sqrt());
             Ok(folded)
         };
-        let dense = |(at, [inner, outer]): (usize, [usize; 2])| -> Result<Dense, WeightsError> {
+        let decoder = |at: usize| weights.take(&format!("decoder.{at}.weight"), &DECODER[at]);
+        let dense = |(at, [_, outer]): (usize, [usize; 2])| -> Result<Dense, WeightsError> {
+            let patch = if at == 0 { WIDTH * outer } else { 0 };
             Ok(Dense {
-                weight: weights.take(&format!("decoder.{at}.weight"), &[inner, outer])?,
+                weight: Packed::new(&decoder(at)?[patch..], outer),
                 bias: weights.take(&format!("decoder.{at}.bias"), &[outer])?,
             })
         };
@@ -109,47 +124,74 @@ impl FaithfulNetwork {
             rigid: encoder("rigid", RIGID)?,
             heads: [head(0)?, head(1)?],
             decoder: DECODER.into_iter().enumerate().map(dense).collect::<Result<_, _>>()?,
+            first: Packed::new(&decoder(0)?[..WIDTH * DECODER[0][1]], DECODER[0][1]),
             tool: Propagation::new(TOOL_NODES, &tool::edges()),
         })
     }
 
-    /// The encoded patch, 64 × 256; depends on the patch alone, so it can be kept.
-    pub fn encode_patch(&self, rest: &Field, mesh: &Propagation, memory: &mut Memory) -> Vec<f32> {
-        let mut features = Vec::new();
+    /// What depends on the patch alone.
+    pub fn encode_patch(&self, rest: &Field, mesh: &Propagation, memory: &mut Memory) -> EncodedPatch {
+        self.encode_patch_observed(rest, mesh, memory, &mut |_, _, _| {})
+    }
+
+    /// The same, layer by layer shown to `seen`.
+    pub fn encode_patch_observed(
+        &self,
+        rest: &Field,
+        mesh: &Propagation,
+        memory: &mut Memory,
+        seen: Observer,
+    ) -> EncodedPatch {
+        let (mut features, mut soft) = (Vec::new(), Vec::new());
         features::soft(rest, &mut features);
-        let mut encoded = Vec::new();
-        encode(&self.soft, mesh, &features, memory, &mut encoded);
-        encoded
+        encode((&self.soft, "soft"), mesh, &features, memory, &mut soft, seen);
+        let queries = [0, 1].map(|head: usize| {
+            let mut query = vec![0.0; soft.len()];
+            product(&mut query, &soft, &self.heads[head], WIDTH, WIDTH, Into::Place);
+            query
+        });
+        let mut first = vec![0.0; soft.len()];
+        fill_rows(&mut first, &self.decoder[0].bias);
+        self.first.add_product(&mut first, &soft);
+        EncodedPatch { queries, first }
     }
 
     /// Displacement of each node (mm), given the encoded patch and the numbers of the tool's nodes (`features::rigid`).
-    pub fn predict(&self, soft: &[f32], tool: &[f32], memory: &mut Memory) -> Field {
+    pub fn predict(&self, patch: &EncodedPatch, tool: &[f32], memory: &mut Memory) -> Field {
+        self.predict_observed(patch, tool, memory, &mut |_, _, _| {})
+    }
+
+    /// The same, layer by layer shown to `seen`.
+    pub fn predict_observed(&self, patch: &EncodedPatch, tool: &[f32], memory: &mut Memory, seen: Observer) -> Field {
         let mut rigid = std::mem::take(&mut memory.rigid);
-        encode(&self.rigid, &self.tool, tool, memory, &mut rigid);
-        let Memory { query, scores, joined, next, .. } = memory;
-        joined.resize(NODE_COUNT * DECODER[0][0], 0.0);
-        for (row, soft) in joined.chunks_exact_mut(DECODER[0][0]).zip(soft.chunks_exact(WIDTH)) {
-            row[..WIDTH].copy_from_slice(soft);
-        }
-        query.resize(NODE_COUNT * WIDTH, 0.0);
+        encode((&self.rigid, "rigid"), &self.tool, tool, memory, &mut rigid, seen);
+        let Memory { scores, value, joined, next, .. } = memory;
         scores.resize(NODE_COUNT * TOOL_NODES, 0.0);
-        for (at, head) in self.heads.iter().enumerate() {
-            product(query, soft, head, WIDTH, WIDTH, Into::Place);
+        value.resize(NODE_COUNT * WIDTH, 0.0);
+        joined.resize(NODE_COUNT * WIDTH * HEADS, 0.0);
+        for (at, query) in patch.queries.iter().enumerate() {
             product_transposed(scores, query, &rigid, TOOL_NODES, WIDTH);
             softmax(scores, TOOL_NODES);
-            product(query, scores, &rigid, TOOL_NODES, WIDTH, Into::Place);
-            for (row, value) in joined.chunks_exact_mut(DECODER[0][0]).zip(query.chunks_exact(WIDTH)) {
-                row[WIDTH * (1 + at)..][..WIDTH].copy_from_slice(value);
+            product(value, scores, &rigid, TOOL_NODES, WIDTH, Into::Place);
+            seen("head", at, value);
+            for (row, value) in joined.chunks_exact_mut(WIDTH * HEADS).zip(value.chunks_exact(WIDTH)) {
+                row[WIDTH * at..][..WIDTH].copy_from_slice(value);
             }
         }
         memory.rigid = rigid;
-        for (at, (dense, [inner, outer])) in self.decoder.iter().zip(DECODER).enumerate() {
+        for (at, (dense, [_, outer])) in self.decoder.iter().zip(DECODER).enumerate() {
             next.resize(NODE_COUNT * outer, 0.0);
-            fill_rows(next, &dense.bias);
-            product(next, joined, &dense.weight, inner, outer, Into::Sum);
+            if at == 0 {
+                // The patch's part of the sum is known; what is left are the heads' rows.
+                next.copy_from_slice(&patch.first);
+            } else {
+                fill_rows(next, &dense.bias);
+            }
+            dense.weight.add_product(next, joined);
             if at + 1 < DECODER.len() {
                 relu(next);
             }
+            seen("decoder", at, next);
             std::mem::swap(joined, next);
         }
         let rows = joined.as_chunks::<3>().0;
@@ -157,13 +199,22 @@ impl FaithfulNetwork {
     }
 }
 
-/// Two layers of TAGConv, each followed by ReLU.
-fn encode(layers: &[TagConv; 2], mesh: &Propagation, features: &[f32], memory: &mut Memory, out: &mut Vec<f32>) {
+/// Two layers of TAGConv, each followed by ReLU; named after the body.
+fn encode(
+    (layers, body): (&[TagConv; 2], &str),
+    mesh: &Propagation,
+    features: &[f32],
+    memory: &mut Memory,
+    out: &mut Vec<f32>,
+    seen: Observer,
+) {
     let Memory { hops, layer, .. } = memory;
     layers[0].forward(mesh, features, hops, layer);
     relu(layer);
+    seen(body, 0, layer);
     layers[1].forward(mesh, layer, hops, out);
     relu(out);
+    seen(body, 1, out);
 }
 
 const _: () = assert!(HOPS == 3, "K of the paper");

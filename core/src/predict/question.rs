@@ -5,6 +5,7 @@ use nalgebra::{Unit, Vector3};
 use super::choice::{Decision, Expected, decide, pressure, tool_flex};
 use super::expected_error::Situation;
 use super::linear::{LinearAnswer, Load, Press, press};
+use super::sampled;
 use super::types::{Control, EffectChoice, EffectReport, Level, PredictError, Request};
 use super::{MAX_DEPTH_SHARE, MAX_SETTLED_STRAIN, PUNCTURE_PRESSURE_PER_MODULUS, PreparedScene};
 use crate::effects::finite_strain;
@@ -126,7 +127,10 @@ impl Question<'_> {
     pub(super) fn situation(&self, depth_mm: f64, strain: f64, press: Option<&Press>) -> Situation {
         let points = self.tool.patch_from_needle.rotation * -Vector3::z_axis();
         let angle_deg = press.map_or(0.0, |press| points.dot(&press.touch.inward).clamp(-1.0, 1.0).acos().to_degrees());
-        Situation::new(&self.prepared.scene, &self.request.needle.shape, angle_deg, depth_mm, strain)
+        let mut situation =
+            Situation::new(&self.prepared.scene, &self.request.needle.shape, angle_deg, depth_mm, strain);
+        situation.sampled &= sampled::has_drive(&points, &self.motion.direction);
+        situation
     }
 
     /// What the eye's pressure and fluid under the retina do by themselves.

@@ -6,6 +6,8 @@
 //!
 //! Not here: how often each is drawn (the data sets), what the errors are (`expected_error`).
 
+use nalgebra::Vector3;
+
 use crate::needle::{Gauge, NeedleShape, Tip};
 use crate::range::ParameterRange;
 use crate::scene::{LEAST_PIT_FLOOR_MM, Scene, SceneSurface};
@@ -24,6 +26,8 @@ pub const BEVEL_DEG: [f64; 2] = [25.0, 60.0];
 pub const TILT_DEG: [f64; 2] = [0.0, 60.0];
 /// Largest angle of the needle to the inward normal (degrees): that tilt and the eye's curvature.
 pub const ANGLE_DEG: f64 = 65.0;
+/// Angle between the needle's axis and the way that it is driven (degrees).
+pub const LEAN_DEG: [f64; 2] = [0.0, 15.0];
 /// Rounding of places that were computed from numbers.
 const ROUNDING: f64 = 1e-9;
 
@@ -89,6 +93,12 @@ fn has_layer(layer: &Layer, ranges: &LayerRanges) -> bool {
             logarithmic(&ranges.youngs_modulus, INNER),
         )
         && between(layer.poisson_ratio, straight(&ranges.poisson_ratio, -INNER), straight(&ranges.poisson_ratio, INNER))
+}
+
+/// Whether a needle that points along `points` and is driven along `driven` (unit vectors in patch coordinates) was sampled.
+pub fn has_drive(points: &Vector3<f64>, driven: &Vector3<f64>) -> bool {
+    let within = |cosine: f64, [_, most_deg]: [f64; 2]| cosine >= most_deg.to_radians().cos() - ROUNDING;
+    within(-points.z, TILT_DEG) && within(points.dot(driven), LEAN_DEG)
 }
 
 /// Whether needles like this one were sampled.

@@ -11,7 +11,7 @@ use crate::evaluate::report::report;
 use crate::train::checkpoint::write_whole;
 
 /// Where the weights that ship lie.
-const WEIGHTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/weights");
+pub(super) const WEIGHTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/weights");
 /// Where the report goes.
 const REPORT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/REPORT.md");
 

@@ -12,6 +12,7 @@ use retina_core::network::weights::hash;
 
 use crate::data::Data;
 use crate::faithful::learn::FaithfulLearner;
+use crate::faithful::variant::Variant;
 use crate::sample::{Sample, Split};
 use crate::shard;
 use crate::train::card::{self, Card, Parity};
@@ -78,17 +79,17 @@ pub struct Arguments {
 /// Hidden width of the heads.
 const HIDDEN: usize = 64;
 /// How a network is trained unless told.
-struct Defaults {
-    batch: usize,
+pub(super) struct Defaults {
+    pub(super) batch: usize,
     /// Samples whose gradient is computed at once.
-    chunk: usize,
-    rate: f32,
-    decay: f32,
+    pub(super) chunk: usize,
+    pub(super) rate: f32,
+    pub(super) decay: f32,
 }
 /// The contact networks.
 const CONTACT: Defaults = Defaults { batch: 64, chunk: 16, rate: 2e-3, decay: 0.5 };
 /// The paper's: its public configuration.
-const FAITHFUL: Defaults = Defaults { batch: 4, chunk: 1, rate: 4e-4, decay: 0.0 };
+pub(super) const FAITHFUL: Defaults = Defaults { batch: 4, chunk: 1, rate: 4e-4, decay: 0.0 };
 /// File of the settings that a run began with.
 const SETTINGS: &str = "settings.json";
 
@@ -99,7 +100,7 @@ const SETTINGS: &str = "settings.json";
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let data = Data::read(&arguments.data)?;
     if arguments.network == Which::Faithful {
-        let learner = FaithfulLearner::new(&data.samples);
+        let learner = FaithfulLearner::new(&data.samples, Variant::PAPER);
         let state = train(arguments, &learner, &FAITHFUL)?;
         return finish(arguments, &learner, &data, &state, learner.tensors(&state.best), None);
     }

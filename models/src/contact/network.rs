@@ -13,6 +13,7 @@ use retina_core::network::graph::Graph;
 use retina_core::patch::NODE_COUNT;
 
 use super::prepared::Prepared;
+use crate::train::layers::Layer;
 use crate::train::matrix::{add_product, add_product_transposed, add_row_sum, add_transposed_product};
 use crate::train::parameters::{Layout, draw};
 
@@ -84,6 +85,23 @@ pub struct Pass {
     pub motion: Vec<f32>,
     /// Logarithms of the error's quantiles over the depth, a row a sample.
     pub quantile: Vec<f32>,
+}
+
+impl Pass {
+    /// Every layer of the first sample, as the core's observer is shown them.
+    pub fn layers(&self, form: Form) -> Vec<Layer> {
+        let Form { width, coarse, .. } = form;
+        let (first, pooled) = (NODE_COUNT * width, width + Features::global_width(coarse));
+        let mut layers = vec![Layer::new("input", 0, width, &self.xs[0][..first])];
+        layers.extend(self.xs[1..].iter().enumerate().map(|(at, x)| Layer::new("block", at, width, &x[..first])));
+        layers.extend([
+            Layer::new("output", 0, BASIS, &self.out[..NODE_COUNT * BASIS]),
+            Layer::new("pooled", 0, pooled, &self.pooled[..pooled]),
+            Layer::new("motion", 0, MOTION, &self.motion[..MOTION]),
+            Layer::new("quantile", 0, QUANTILES, &self.quantile[..QUANTILES]),
+        ]);
+        layers
+    }
 }
 
 /// Derivatives of the loss by what a forward pass answers.

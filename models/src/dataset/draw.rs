@@ -15,7 +15,8 @@ use retina_core::approach::first_touch;
 use retina_core::needle::{Needle, NeedleShape, Tip};
 use retina_core::patch::Patch;
 use retina_core::predict::sampled::{
-    BEVEL_DEG, EDGE_SHARE, INNER, TILT_DEG, gauge_radii_mm, logarithmic, retina_ranges, straight,
+    BEVEL_DEG, EDGE_SHARE, INNER, LEAN_DEG as SAMPLED_LEAN_DEG, TILT_DEG, gauge_radii_mm, logarithmic, retina_ranges,
+    straight,
 };
 use retina_core::scene::Scene;
 use retina_core::tissue::{Layer, ranges};
@@ -36,7 +37,7 @@ pub const REACH_MM: f64 = 0.8;
 /// Tilt of `outside` (degrees).
 pub const OUTSIDE_TILT_DEG: [f64; 2] = [60.0, 70.0];
 /// Angle between needle and direction (degrees).
-pub const LEAN_DEG: [f64; 2] = [0.0, 15.0];
+pub const LEAN_DEG: [f64; 2] = SAMPLED_LEAN_DEG;
 /// The same of `outside` (degrees).
 pub const OUTSIDE_LEAN_DEG: [f64; 2] = [15.0, 25.0];
 /// Radius of `outside`'s needles: thicker than the thickest gauge, up to this (mm).

@@ -89,6 +89,9 @@ pub struct Manifest {
     pub effects: Vec<String>,
     /// Where the estimated error of the truth comes from.
     pub truth_error: String,
+    /// What it is made of, by tip: a distance (µm) and a share of the largest displacement.
+    #[serde(default)]
+    pub truth_error_by_tip: BTreeMap<String, [f64; 2]>,
     /// The shards.
     pub shards: Vec<ShardRecord>,
 }
@@ -180,6 +183,11 @@ impl Manifest {
                 .into(),
             effects: EFFECTS.map(str::to_owned).to_vec(),
             truth_error: truth::ERROR_BASIS.to_owned(),
+            truth_error_by_tip: truth::TIPS
+                .iter()
+                .zip(truth::MEASURED)
+                .map(|(tip, of)| ((*tip).to_owned(), of))
+                .collect(),
             shards,
         }
     }

@@ -32,8 +32,9 @@ pub const TIPS: [&str; 3] = ["half ball", "flat", "bevelled"];
 pub const ERROR_BASIS: &str = "distance of the worst node to level reference: the smaller of its 95 % quantile and that of its share of the largest \
                                displacement, by tip, as `truth-error` measured them";
 
-/// 95 % of the measured distances of the worst node (µm), and 95 % of their shares of the largest displacement, by tip.
-const MEASURED: [(f64, f64); TIPS.len()] = [(0.0, 0.0), (0.0, 0.0), (0.0, 0.0)];
+/// 95 % of the measured distances of the worst node (µm), and 95 % of their shares of the largest displacement, by tip: what `truth-error --paths 24 --seed 77` printed
+/// for 66, 36 and 22 samples.
+pub const MEASURED: [[f64; 2]; TIPS.len()] = [[1.33, 0.0209], [6.54, 0.0505], [13.64, 0.1799]];
 
 /// Estimated error of the truth's worst node (mm).
 pub fn error_mm(sample: &Sample) -> f32 {
@@ -43,7 +44,7 @@ pub fn error_mm(sample: &Sample) -> f32 {
 
 /// The estimate for a tip and the largest displacement (µm).
 fn estimated_um(tip: usize, largest_um: f64) -> f64 {
-    let (distance_um, share) = MEASURED[tip];
+    let [distance_um, share] = MEASURED[tip];
     distance_um.min(share * largest_um)
 }
 

@@ -7,7 +7,7 @@ use retina_core::network::contact::{ContactNetwork, Corrected, Memory, Start};
 use retina_core::network::faithful::tag::Propagation;
 use retina_core::network::faithful::{self, FaithfulNetwork};
 use retina_core::network::graph::Graph;
-use retina_core::network::input::{Field, Input};
+use retina_core::network::input::{Answer, Field, Input};
 use retina_core::network::weights::WeightsError;
 use retina_core::patch::NODE_COUNT;
 
@@ -64,7 +64,8 @@ impl Predictor for Coarse {
 
 /// Level `network` or `corrected`.
 pub struct Contact {
-    network: ContactNetwork,
+    /// The network.
+    pub network: ContactNetwork,
     graph: Graph,
     memory: Memory,
 }
@@ -79,6 +80,19 @@ impl Contact {
         Ok(Contact { network, graph: describe::graph(), memory: Memory::default() })
     }
 
+    /// Its name in tables.
+    pub fn label(&self) -> String {
+        match self.network.start() {
+            Start::Linear => "`network`".to_owned(),
+            Start::Coarse => "`corrected`".to_owned(),
+        }
+    }
+
+    /// The answer of `coarse`, where it corrects that one.
+    pub fn started_from<'a>(&self, input: &'a Input) -> Option<&'a Answer> {
+        input.coarse.as_ref().filter(|_| self.network.start() == Start::Coarse)
+    }
+
     /// All that it answers.
     pub fn answer(&mut self, input: &Input) -> Option<Corrected> {
         self.network.predict(input, &self.graph, &mut self.memory)
@@ -87,10 +101,7 @@ impl Contact {
 
 impl Predictor for Contact {
     fn name(&self) -> String {
-        match self.network.start() {
-            Start::Linear => "`network`".to_owned(),
-            Start::Coarse => "`corrected`".to_owned(),
-        }
+        self.label()
     }
 
     fn displacement(&mut self, _sample: &Sample, input: &Input) -> Option<Field> {

@@ -23,7 +23,7 @@ const NEEDLES: [(&str, f32); 3] = [("41G to 30G", 0.1555), ("30G to 25G", 0.257)
 /// Names of the tips.
 pub const TIPS: [&str; 3] = ["half balls", "flat tips", "bevels"];
 /// Batch of the published evaluation.
-const PUBLISHED_BATCH: usize = 4;
+pub const PUBLISHED_BATCH: usize = 4;
 
 /// Splits that are reported.
 const REPORTED: [Split; 3] = [Split::Test, Split::Hard, Split::Outside];
@@ -65,6 +65,13 @@ pub fn report(data: &Data, networks: Vec<Contact>, paper: Option<Faithful>) -> S
     let counts: Vec<String> =
         Split::ALL.iter().map(|&split| format!("{} {}", split.name(), data.of(split).count())).collect();
     let _ = writeln!(text, "Samples: {}. SHA-256 of the shards: `{}`.\n", counts.join(", "), data.sha256);
+    let truth_um: Vec<f64> = data.of(Split::Test).map(|sample| 1e3 * f64::from(sample.truth_error_mm)).collect();
+    let _ = writeln!(
+        text,
+        "The truth's own estimated error (worst node against level `reference`, test split): median {:.2} µm, 95 % {:.2} µm.\n",
+        quantile(&truth_um, 0.5),
+        quantile(&truth_um, 0.95)
+    );
     let coverage = coverage(&mut networks, &REPORTED.map(|split| (split, split_samples(split))));
     let motion = motion(&mut networks, &split_samples(Split::Test));
     predictors.extend(networks.into_iter().map(|network| Box::new(network) as Box<dyn Predictor>));

@@ -1,8 +1,7 @@
-//! The layers of the paper's network, forward and backward.
+//! Dense layers and the attention between the bodies, forward and backward.
 
 use std::ops::Range;
 
-use retina_core::network::faithful::tag::{HOPS, Propagation};
 use retina_core::network::faithful::{WIDTH, relu, softmax};
 
 use crate::train::matrix::{add_product, add_product_transposed, add_row_sum, add_transposed_product};
@@ -54,49 +53,6 @@ impl Dense {
         let mut dx = vec![0.0; x.len()];
         add_product_transposed(&mut dx, &dy, &parameters[self.weight.clone()], self.inner, self.outer);
         dx
-    }
-}
-
-/// Two layers of TAGConv: each is the mesh's hops and a dense layer with ReLU.
-#[derive(Clone, Debug)]
-pub struct Encoder {
-    /// The dense parts.
-    pub layers: [Dense; 2],
-}
-
-/// What the backward pass needs of an encoder.
-#[derive(Clone, Debug, Default)]
-pub struct Encoded {
-    hops: [Vec<f32>; 2],
-    first: Vec<f32>,
-    /// What it answered, `nodes × 256`.
-    pub out: Vec<f32>,
-}
-
-impl Encoder {
-    /// Encodes the numbers of a mesh's nodes.
-    pub fn forward(&self, parameters: &[f32], mesh: &Propagation, x: &[f32]) -> Encoded {
-        let mut hops = [Vec::new(), Vec::new()];
-        mesh.hops(x, &mut hops[0]);
-        let first = self.layers[0].forward(parameters, &hops[0]);
-        mesh.hops(&first, &mut hops[1]);
-        let out = self.layers[1].forward(parameters, &hops[1]);
-        Encoded { hops, first, out }
-    }
-
-    /// Adds to `gradient`, given the derivative by what `forward` answered.
-    pub fn backward(
-        &self,
-        parameters: &[f32],
-        mesh: &Propagation,
-        kept: &Encoded,
-        dout: Vec<f32>,
-        gradient: &mut [f32],
-    ) {
-        let mut dhops = self.layers[1].backward(parameters, &kept.hops[1], &kept.out, dout, gradient);
-        mesh.gather(&mut dhops);
-        let dfirst = dhops.chunks_exact((HOPS + 1) * WIDTH).flat_map(|row| row[..WIDTH].to_vec()).collect();
-        self.layers[0].backward(parameters, &kept.hops[0], &kept.first, dfirst, gradient);
     }
 }
 

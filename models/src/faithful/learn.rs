@@ -5,6 +5,7 @@ use retina_core::network::faithful::NAME;
 
 use super::network::Network;
 use super::prepared::{Prepared, SYMMETRIES, View};
+use super::variant::Variant;
 use crate::describe;
 use crate::sample::{Sample, Split};
 use crate::train::export::Named;
@@ -16,19 +17,21 @@ use crate::train::score::Score;
 pub struct FaithfulLearner {
     /// The network.
     pub network: Network,
+    variant: Variant,
     train: Vec<Prepared>,
     validation: Vec<Prepared>,
 }
 
 impl FaithfulLearner {
     /// Prepares the samples of the splits `train` and `validation`.
-    pub fn new(samples: &[Sample]) -> Self {
+    pub fn new(samples: &[Sample], variant: Variant) -> Self {
         let of = |split: Split| -> Vec<Prepared> {
             let chosen: Vec<&Sample> = samples.iter().filter(|sample| sample.split == split).collect();
             chosen.into_par_iter().map(Prepared::new).collect()
         };
         FaithfulLearner {
-            network: Network::new(describe::graph()),
+            network: Network::new(describe::graph(), variant.backbone),
+            variant,
             train: of(Split::Train),
             validation: of(Split::Validation),
         }
@@ -68,6 +71,7 @@ impl Learner for FaithfulLearner {
         let mut view = View::default();
         for &sample in samples {
             self.train[sample].view(symmetry_of(sample, epoch), &mut view);
+            self.variant.seen.hide(&mut view);
             let pass = self.network.forward(parameters, &view);
             let (one, slope) = self.network.loss(&pass.rows[pass.rows.len() - 1], &view.target, weight);
             self.network.backward(parameters, &pass, slope, gradient);
@@ -81,6 +85,7 @@ impl Learner for FaithfulLearner {
         let mut view = View::default();
         for &sample in samples {
             self.validation[sample].view(0, &mut view);
+            self.variant.seen.hide(&mut view);
             let pass = self.network.forward(parameters, &view);
             score += self.network.loss(&pass.rows[pass.rows.len() - 1], &view.target, 0.0).0;
         }

@@ -3,6 +3,8 @@
 //! `m ← β₁m + (1−β₁)g`, `v ← β₂v + (1−β₂)g²`, `θ ← θ − η (m̂/(√v̂ + ε) + λθ)` with the bias-corrected `m̂`, `v̂` (Kingma & Ba 2015; Loshchilov & Hutter
 //! 2019). The gradient is scaled down to `LARGEST_NORM` first.
 
+use rayon::prelude::*;
+
 /// Decay of the first moment.
 const BETA_1: f32 = 0.9;
 /// Decay of the second moment.
@@ -13,6 +15,9 @@ const EPSILON: f32 = 1e-8;
 const LARGEST_NORM: f32 = 5.0;
 /// Weight of the newest gradient in the usual length.
 const NORM_RATE: f32 = 0.02;
+
+/// Parameters that one thread moves at once.
+const MOVED: usize = 1 << 14;
 
 /// Moments and step count.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,14 +52,18 @@ impl Adam {
         self.usual_norm += NORM_RATE * (norm.min(largest) - self.usual_norm);
         let first = 1.0 - BETA_1.powf(self.steps as f32);
         let second = 1.0 - BETA_2.powf(self.steps as f32);
-        for (((parameter, g), m), v) in
-            parameters.iter_mut().zip(gradient).zip(self.m.iter_mut()).zip(self.v.iter_mut())
-        {
-            let g = g * scale;
-            *m += (1.0 - BETA_1) * (g - *m);
-            *v += (1.0 - BETA_2) * (g * g - *v);
-            *parameter -= rate * ((*m / first) / ((*v / second).sqrt() + EPSILON) + self.decay * *parameter);
-        }
+        let decay = self.decay;
+        let moments = self.m.par_chunks_mut(MOVED).zip(self.v.par_chunks_mut(MOVED));
+        parameters.par_chunks_mut(MOVED).zip(gradient.par_chunks(MOVED)).zip(moments).for_each(
+            |((parameters, gradient), (m, v))| {
+                for (((parameter, g), m), v) in parameters.iter_mut().zip(gradient).zip(m).zip(v) {
+                    let g = g * scale;
+                    *m += (1.0 - BETA_1) * (g - *m);
+                    *v += (1.0 - BETA_2) * (g * g - *v);
+                    *parameter -= rate * ((*m / first) / ((*v / second).sqrt() + EPSILON) + decay * *parameter);
+                }
+            },
+        );
     }
 }
 

@@ -4,6 +4,8 @@
 
 use std::ops::Range;
 
+use retina_core::network::weights::{Weights, WeightsError};
+
 /// One tensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tensor {
@@ -39,6 +41,20 @@ impl Layout {
         let range = start..start + shape.iter().product::<usize>();
         self.tensors.push(Tensor { name: name.to_owned(), shape: shape.to_vec(), range: range.clone() });
         range
+    }
+}
+
+impl Layout {
+    /// The parameters that a weight file holds for this layout.
+    ///
+    /// # Errors
+    /// A tensor that is missing or has another shape.
+    pub fn read(&self, weights: &Weights) -> Result<Vec<f32>, WeightsError> {
+        let mut parameters = vec![0.0; self.len()];
+        for tensor in &self.tensors {
+            parameters[tensor.range.clone()].copy_from_slice(&weights.take(&tensor.name, &tensor.shape)?);
+        }
+        Ok(parameters)
     }
 }
 

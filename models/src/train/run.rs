@@ -104,6 +104,9 @@ pub fn epochs_within(learner: &dyn Learner, settings: &Settings, minutes: f64) -
     ((60.0 * minutes / epoch) as usize).max(1)
 }
 
+/// Numbers of a gradient that one thread adds up at once.
+const SUMMED: usize = 1 << 14;
+
 fn step_gradient(
     learner: &dyn Learner,
     settings: &Settings,
@@ -120,12 +123,15 @@ fn step_gradient(
             (learner.learn(parameters, chunk, epoch, weight, &mut part), part)
         })
         .collect();
-    gradient.fill(0.0);
+    // Each number is summed in the order of the parts, so the number of threads does not show.
+    gradient.par_chunks_mut(SUMMED).enumerate().for_each(|(at, sum)| {
+        sum.fill(0.0);
+        for (_, part) in &parts {
+            sum.iter_mut().zip(&part[at * SUMMED..]).for_each(|(sum, g)| *sum += g);
+        }
+    });
     let mut score = Score::default();
-    for (part_score, part) in parts {
-        score += part_score;
-        gradient.iter_mut().zip(part).for_each(|(sum, g)| *sum += g);
-    }
+    parts.into_iter().for_each(|(part, _)| score += part);
     score
 }
 

@@ -2,8 +2,11 @@
 //!
 //! The hops are written side by side, so the sum is one product of `nodes × (K + 1) inputs` by `(K + 1) inputs × outputs`.
 
+use pulp::Arch;
+
 use super::WIDTH;
-use crate::network::dense::{Into, fill_rows, product};
+use crate::network::dense::fill_rows;
+use crate::network::packed::Packed;
 use crate::network::weights::{Weights, WeightsError};
 
 /// K: how far a node hears.
@@ -41,25 +44,31 @@ impl Propagation {
         self.entries.len()
     }
 
-    /// Adds `Â x` to `out`, where rows of both are `stride` apart, `width` numbers long and begin at `from` and `to` within their rows.
+    /// Adds `Â x` to the numbers that stand at `to`: rows are `stride` apart, `width` numbers long, and those of x begin at `from` within them.
     fn hop(&self, rows: &mut [f32], stride: usize, width: usize, from: usize, to: usize) {
-        for node in 0..self.nodes() {
-            for &(other, weight) in &self.entries[self.starts[node]..self.starts[node + 1]] {
-                for k in 0..width {
-                    rows[node * stride + to + k] += weight * rows[other * stride + from + k];
+        let mut sum = [0.0; WIDTH];
+        let sum = &mut sum[..width];
+        // With the widest vectors of this processor.
+        Arch::new().dispatch(|| {
+            for node in 0..self.nodes() {
+                sum.copy_from_slice(&rows[node * stride + to..][..width]);
+                for &(other, weight) in &self.entries[self.starts[node]..self.starts[node + 1]] {
+                    let x = &rows[other * stride + from..][..width];
+                    sum.iter_mut().zip(x).for_each(|(sum, x)| *sum += weight * x);
                 }
+                rows[node * stride + to..][..width].copy_from_slice(sum);
             }
-        }
+        });
     }
 
     /// `[x, Âx, Â²x, Â³x]` side by side.
     pub fn hops(&self, x: &[f32], out: &mut Vec<f32>) {
         let width = x.len() / self.nodes();
         let stride = (HOPS + 1) * width;
-        out.clear();
         out.resize(self.nodes() * stride, 0.0);
         for (row, x) in out.chunks_exact_mut(stride).zip(x.chunks_exact(width)) {
             row[..width].copy_from_slice(x);
+            row[width..].fill(0.0);
         }
         for k in 0..HOPS {
             self.hop(out, stride, width, k * width, (k + 1) * width);
@@ -79,8 +88,7 @@ impl Propagation {
 
 /// One layer.
 pub struct TagConv {
-    inputs: usize,
-    weight: Vec<f32>,
+    weight: Packed,
     bias: Vec<f32>,
 }
 
@@ -91,8 +99,7 @@ impl TagConv {
     /// [`WeightsError`].
     pub fn new(weights: &Weights, name: &str, inputs: usize) -> Result<Self, WeightsError> {
         Ok(TagConv {
-            inputs,
-            weight: weights.take(&format!("{name}.weight"), &[(HOPS + 1) * inputs, WIDTH])?,
+            weight: Packed::new(&weights.take(&format!("{name}.weight"), &[(HOPS + 1) * inputs, WIDTH])?, WIDTH),
             bias: weights.take(&format!("{name}.bias"), &[WIDTH])?,
         })
     }
@@ -102,6 +109,6 @@ impl TagConv {
         mesh.hops(x, hops);
         out.resize(mesh.nodes() * WIDTH, 0.0);
         fill_rows(out, &self.bias);
-        product(out, hops, &self.weight, (HOPS + 1) * self.inputs, WIDTH, Into::Sum);
+        self.weight.add_product(out, hops);
     }
 }
