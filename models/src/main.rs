@@ -31,7 +31,7 @@ enum Command {
     DatasetReport(commands::dataset::ReportArguments),
     /// Prints what predictions cost, split into data and network, and the paper's network beside ONNX Runtime.
     Runtime(commands::runtime::Arguments),
-    /// Measures how far the truth of the samples is from level `reference`, on random paths.
+    /// Measures how far the truth of the samples is from that on a finer mesh, on random paths.
     TruthError(commands::truth_error::Arguments),
     /// Writes a data set in the layout that the public DeformContact code reads.
     ExportDeformcontact(commands::deformcontact::ExportArguments),

@@ -3,12 +3,16 @@
 //! Iterations: a round tip takes what the default needle takes (6 to 9); an edge finds its contact points one by one and takes up to three times that.
 
 use retina_core::needle::{NeedleShape, Tip};
-use retina_core::predict::Request;
+use retina_core::predict::{Level, Request};
 
 use crate::table::{Case, Expect::*, at, built_in, case, flat, held, lean, push, rolled, run};
 
 fn ball(radius_mm: f64) -> NeedleShape {
     NeedleShape::hemispherical(radius_mm)
+}
+
+fn converged(request: Request) -> Request {
+    Request { level: Level::Reference, ..request }
 }
 
 fn bevel(radius_mm: f64, angle_deg: f64, edge_radius_mm: f64) -> NeedleShape {
@@ -41,6 +45,13 @@ const CASES: &[Case] = &[
     case("bevel, heel first", flat, || rolled(lean(bevel(0.257, 45.0, 0.0257), 60.0, 30.0, 0.2), 180.0), Answer(10)),
     case("bevel on its flank", flat, || rolled(lean(bevel(0.257, 30.0, 0.0257), 45.0, 20.0, 0.2), 90.0), Answer(12)),
     case("bevel of 0.1 µm edge", flat, || push(bevel(0.1, 30.0, 1e-4), 0.002), Answer(7)),
+    case("bevel that cuts in, at `reference`", flat, || converged(push(bevel(0.3205, 30.0, 0.03205), 0.2)), Answer(38)),
+    case(
+        "bevel that punctures, at `reference`",
+        flat,
+        || converged(push(bevel(0.3205, 30.0, 0.03205), 1.2)),
+        Refusal("the tissue punctures"),
+    ),
     case("grazing force, 1° from tangent", flat, || lean(ball(0.257), 0.0, 89.0, 0.1), Refusal("force_mn leans 89.0")),
     case(
         "grazing needle, 1° from tangent",

@@ -1,4 +1,4 @@
-//! `truth-error`: how far the truth of the samples is from level `reference`.
+//! `truth-error`: how far the truth of the samples is from that on a finer mesh.
 
 use std::error::Error;
 
@@ -6,7 +6,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use retina_core::scene::Scene;
 
-use crate::dataset::truth::{NAME, compare, table};
+use crate::dataset::truth::{FINER_NAME, NAME, compare, table};
 
 /// Arguments of `truth-error`.
 #[derive(Args, Clone, Debug)]
@@ -33,7 +33,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         bar.inc(1);
     }
     bar.finish();
-    println!("truth `{NAME}` against level `reference`, {paths} paths, seed {seed}\n");
+    println!("truth `{NAME}` against `{FINER_NAME}`, {paths} paths, seed {seed}\n");
     print!("{}", table(&comparisons));
     Ok(())
 }

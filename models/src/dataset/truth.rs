@@ -1,6 +1,6 @@
-//! How fine the truth is, and how far it may be from level `reference`.
+//! How fine the truth is, and how far it may be from a finer one.
 //!
-//! What `reference` costs is the factorisation of its matrix; what its answer hangs on is the nine cells under the contact and the first rings around
+//! What a fine mesh costs is the factorisation of its matrix; what its answer hangs on is the nine cells under the contact and the first rings around
 //! it. The truth keeps these and saves on the rest. [`compare`] measures what that changes, on paths of their own seed, and [`error_mm`] states it.
 
 use retina_core::comparison::quantile;
@@ -13,23 +13,31 @@ use super::path::{Path, PathMemory};
 use super::report::largest_um;
 use crate::sample::Sample;
 
-/// The truth's mesh: that of `reference` with eight rings in place of twelve, graded towards the contact, two elements through the retina in place of three, and
-/// a rigid sclera. A step that starts from the one before needs no softened approach.
+/// The truth's mesh: eight rings, graded towards the contact, two elements through the retina, and a rigid sclera.
 pub const TRUTH: Resolution =
-    Resolution { rings: 8, ring_grading: 1.25, retina_elements: 2, sclera_elements: 0, ..UNSOFTENED };
+    Resolution { rings: 8, ring_grading: 1.25, retina_elements: 2, sclera_elements: 0, ..FINER };
 
-/// `reference` without that approach, which leads to the same equilibrium.
-const UNSOFTENED: Resolution =
-    Resolution { contact: ContactSettings { softening: 1.0, ..REFERENCE.contact }, ..REFERENCE };
+/// The mesh that it is held against: twelve rings in equal ratios, three elements through the retina and one through the sclera. A step that starts from the one before
+/// needs no softened approach.
+const FINER: Resolution = Resolution {
+    rings: 12,
+    ring_grading: 1.0,
+    retina_elements: 3,
+    sclera_elements: 1,
+    contact: ContactSettings { softening: 1.0, ..REFERENCE.contact },
+    ..REFERENCE
+};
 
 /// Its name, in the manifest.
 pub const NAME: &str = "disc-3-8-2-graded";
+/// Name of the finer one.
+pub const FINER_NAME: &str = "disc-3-12-3";
 
 /// Names of the tips, in the order of [`TipShape::kind`](crate::sample::TipShape::kind).
 pub const TIPS: [&str; 3] = ["half ball", "flat", "bevelled"];
 
 /// Where the estimated error comes from.
-pub const ERROR_BASIS: &str = "distance of the worst node to level reference: the smaller of its 95 % quantile and that of its share of the largest \
+pub const ERROR_BASIS: &str = "distance of the worst node to that on the mesh disc-3-12-3: the smaller of its 95 % quantile and that of its share of the largest \
                                displacement, by tip, as `truth-error` measured them";
 
 /// 95 % of the measured distances of the worst node (µm), and 95 % of their shares of the largest displacement, by tip: what `truth-error --paths 24 --seed 77` printed
@@ -48,7 +56,7 @@ fn estimated_um(tip: usize, largest_um: f64) -> f64 {
     distance_um.min(share * largest_um)
 }
 
-/// The truth of one step held against `reference`.
+/// The truth of one step held against that on the finer mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Comparison {
     /// Number of the tip among [`TIPS`].
@@ -61,7 +69,7 @@ pub struct Comparison {
     pub force: f64,
 }
 
-/// Holds the truth against the mesh of `reference` on path number `path` of `seed`, step by step, until one of the two finds no equilibrium.
+/// Holds the truth against that on the finer mesh on path number `path` of `seed`, step by step, until one of the two finds no equilibrium.
 ///
 /// # Errors
 /// If the path's scene cannot be prepared.
@@ -70,12 +78,12 @@ pub fn compare(seed: u64, path: u32, scenes: &[u8]) -> Result<Vec<Comparison>, P
     let Some(plan) = plan(seed, path, scenes, Depths::Deep) else { return Ok(comparisons) };
     let prepared = PreparedScene::new(plan.scene.clone())?;
     let tip = plan.needle.shape.tip.kind();
-    let meshes = [TRUTH, UNSOFTENED].map(|mesh| Path::new(&plan, &prepared, mesh));
-    let [Ok(mut truth), Ok(mut reference)] = meshes else { return Ok(comparisons) };
+    let meshes = [TRUTH, FINER].map(|mesh| Path::new(&plan, &prepared, mesh));
+    let [Ok(mut truth), Ok(mut finer)] = meshes else { return Ok(comparisons) };
     let mut memories = [PathMemory::default(), PathMemory::default()];
     for step in 0..STEPS {
         let ours = truth.truth(step, &mut memories[0]);
-        let theirs = reference.truth(step, &mut memories[1]);
+        let theirs = finer.truth(step, &mut memories[1]);
         let (Ok(ours), Ok(theirs)) = (ours, theirs) else { break };
         let pairs = ours.displacements.iter().zip(&theirs.displacements);
         let along = |reaction: &nalgebra::Vector3<f64>| -reaction.dot(&plan.direction);

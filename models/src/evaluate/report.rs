@@ -68,7 +68,7 @@ pub fn report(data: &Data, networks: Vec<Contact>, paper: Option<Faithful>) -> S
     let truth_um: Vec<f64> = data.of(Split::Test).map(|sample| 1e3 * f64::from(sample.truth_error_mm)).collect();
     let _ = writeln!(
         text,
-        "The truth's own estimated error (worst node against level `reference`, test split): median {:.2} µm, 95 % {:.2} µm.\n",
+        "The truth's own estimated error (worst node against a finer mesh, test split): median {:.2} µm, 95 % {:.2} µm.\n",
         quantile(&truth_um, 0.5),
         quantile(&truth_um, 0.95)
     );
