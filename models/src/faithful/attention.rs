@@ -4,7 +4,7 @@
 //! z = x W,   sᵢⱼ = leaky(zᵢ·a + zⱼ·b),   αᵢⱼ = softmax over j of sᵢⱼ,   yᵢ = Σⱼ αᵢⱼ zⱼ + c      j: neighbours of i, and i
 //! ```
 //!
-//! After P. Veličković et al., *Graph Attention Networks* (2018); `leaky(x)` is x above zero and [`SLOPE`] x below.
+//! After P. Veličković et al., *Graph Attention Networks* (2018); `leaky(x)` is x above zero and `SLOPE` times x below.
 
 use std::ops::Range;
 
