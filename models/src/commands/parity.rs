@@ -4,11 +4,11 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Args;
-use nalgebra::Vector3;
 use retina_core::network::contact::Start;
 use retina_core::network::faithful::NAME;
 
 use crate::data::Data;
+use crate::dataset::report::largest_um;
 use crate::parity;
 use crate::sample::{Sample, Split};
 use crate::shard;
@@ -28,11 +28,6 @@ pub struct Arguments {
     data: Option<PathBuf>,
 }
 
-/// Largest displacement of a sample (mm).
-fn largest_mm(sample: &Sample) -> f32 {
-    sample.truth.displacement_mm.iter().map(|u| Vector3::from(*u).norm()).fold(0.0, f32::max)
-}
-
 /// Writes `NAME.layers.safetensors` for each network.
 ///
 /// # Errors
@@ -50,7 +45,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     if let Some(folder) = &arguments.data {
         let data = Data::read(std::slice::from_ref(folder))?;
-        let furthest = data.of(Split::Validation).max_by(|a, b| largest_mm(a).total_cmp(&largest_mm(b)));
+        let moved_um = |sample: &Sample| largest_um(&sample.truth.displacement_mm);
+        let furthest = data.of(Split::Validation).max_by(|a, b| moved_um(a).total_cmp(&moved_um(b)));
         let furthest = furthest.ok_or("there is no validation sample")?;
         shard::write(&path(NAME, "parity."), &[*furthest])?;
     }
