@@ -14,8 +14,9 @@ use crate::effect::{Local, Stencils, Term};
 const FIXED: u32 = u32::MAX;
 /// The border's three degrees of freedom are `BORDER`, `BORDER + 1`, `BORDER + 2`.
 const BORDER: u32 = u32::MAX - 3;
-/// Marks a pair that is not stored.
-const SKIP: u32 = u32::MAX;
+
+/// Entries of the corner.
+const CORNER: u32 = 9;
 
 /// Numbering of the degrees of freedom.
 #[derive(Clone, Debug)]
@@ -144,17 +145,18 @@ impl Pattern {
             column_starts.push(rows.len() as u32);
         }
         let stored = rows.len() as u32;
+        let unstored = stored + 3 * free as u32 + CORNER;
         let destination = |a: u32, b: u32| -> u32 {
             let (low, high) = (a.min(b), a.max(b));
             if high == FIXED {
-                SKIP
+                unstored
             } else if low >= BORDER {
                 stored + 3 * free as u32 + 3 * (high - BORDER) + (low - BORDER)
             } else if high >= BORDER {
                 stored + (high - BORDER) * free as u32 + low
             } else {
                 let column = &columns[low as usize];
-                column_starts[low as usize] + column.binary_search(&high).map_or(SKIP, |at| at as u32)
+                column_starts[low as usize] + column.binary_search(&high).map_or(unstored, |at| at as u32)
             }
         };
         let destinations = stencils
@@ -183,9 +185,9 @@ impl Pattern {
         self.rows.len()
     }
 
-    /// Length of the array of values: sparse part, border (3 × free), corner (3 × 3, lower triangle).
+    /// Length of the array of values: sparse part, border (3 × free), corner (3 × 3, lower triangle), and one entry for all pairs that are not stored.
     pub fn len(&self) -> usize {
-        self.rows.len() + 3 * self.free + 9
+        self.rows.len() + 3 * self.free + CORNER as usize + 1
     }
 
     /// Whether there is no unknown.
@@ -321,9 +323,7 @@ pub fn hessian(
         let mut destinations = pattern.destinations[term.set][local.group * per_group..][..per_group].iter();
         for row in 0..n {
             for (value, &destination) in matrix[row * n..=row * n + row].iter().zip(&mut destinations) {
-                if destination != SKIP {
-                    values[destination as usize] += value;
-                }
+                values[destination as usize] += value;
             }
         }
     });

@@ -70,11 +70,12 @@ const QUATERNION_TOLERANCE: f64 = 1e-3;
 /// # Errors
 /// A problem that names the field.
 pub fn request(request: &PredictRequest) -> Result<Request, Problem> {
+    let budget = budget(request.accuracy.as_ref())?;
     Ok(Request {
         needle: needle::needle(&request.needle)?,
         control: control(request.control, request.force_mn)?,
         level: DEFAULT_LEVEL,
-        effects: effects(request.effects.as_ref())?,
+        effects: effects(request.effects.as_ref(), &budget)?,
     })
 }
 
@@ -92,7 +93,9 @@ pub struct Shared {
 /// # Errors
 /// A problem that names the field.
 pub fn shared(accuracy: Option<&AccuracySpec>, given: Option<&EffectsSpec>) -> Result<Shared, Problem> {
-    Ok(Shared { budget: budget(accuracy)?, effects: effects(given)? })
+    let budget = budget(accuracy)?;
+    let effects = effects(given, &budget)?;
+    Ok(Shared { budget, effects })
 }
 
 /// The core's request of one pose of a batch, its level that of one that asks for none.
@@ -172,14 +175,16 @@ fn level(name: &str) -> Result<Level, Problem> {
         .ok_or_else(|| unknown_name("accuracy.level", name, &names))
 }
 
-fn effects(effects: Option<&EffectsSpec>) -> Result<EffectChoice, Problem> {
+/// The effects asked for; what a scene calls for depends on the error that the answer may have.
+fn effects(effects: Option<&EffectsSpec>, budget: &Budget) -> Result<EffectChoice, Problem> {
+    let auto = || budget.max_error_um.map_or(EffectChoice::Auto, EffectChoice::auto_for);
     let known = |field: &str, name: &String| match EFFECT_NAMES.contains(&name.as_str()) {
         true => Ok(()),
         false => Err(unknown_name(field, name, &EFFECT_NAMES)),
     };
     match effects {
-        None => Ok(EffectChoice::Auto),
-        Some(EffectsSpec::Word(word)) if word == "auto" => Ok(EffectChoice::Auto),
+        None => Ok(auto()),
+        Some(EffectsSpec::Word(word)) if word == "auto" => Ok(auto()),
         Some(EffectsSpec::Word(word)) if word == "all" => Ok(EffectChoice::All),
         Some(EffectsSpec::Word(word)) => Err(unknown_name("effects", word, &["auto", "all", "an array of names"])),
         Some(EffectsSpec::Names(names)) => {

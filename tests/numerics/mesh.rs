@@ -6,7 +6,7 @@ use retina_core::effect::{Effect, Local, Stencils, Term};
 use retina_core::mesh::disc::{DiscGeometry, DiscTopology};
 use retina_core::mesh::element::{NODE_OFFSETS, QUADRATURE, gauss_rule, shapes};
 use retina_core::mesh::ordering::nested_dissection;
-use retina_core::mesh::sample::locate;
+use retina_core::mesh::sample::SurfaceLocator;
 use retina_core::mesh::wall::{LayerThickness, WallDivision, WallGeometry, WallTopology};
 use retina_core::solve::sparse::{Factor, LinearSolveError, SymbolicFactor};
 use retina_core::surface::Surface;
@@ -329,7 +329,7 @@ fn samples_lie_where_they_were_asked_for() {
     while inside < 300 {
         let at = [center[0] + 1.2 * rim * random(), center[1] + 1.2 * rim * random()];
         let distance = (at[0] - center[0]).hypot(at[1] - center[1]);
-        match locate(&topology, &geometry, at) {
+        match SurfaceLocator::new(&topology, &geometry).locate(at) {
             Some(sample) => {
                 // Quadratic edges stray from the rim's circle by less than a percent.
                 assert!(distance < 1.01 * rim);
@@ -347,7 +347,8 @@ fn samples_lie_where_they_were_asked_for() {
     assert!(outside > 20);
     // At a node of the surface, the node alone.
     for &vertex in &topology.face_points[0] {
-        let sample = locate(&topology, &geometry, geometry.parameters[topology.vertices[vertex].0]).unwrap();
+        let sample =
+            SurfaceLocator::new(&topology, &geometry).locate(geometry.parameters[topology.vertices[vertex].0]).unwrap();
         let weight: f64 = sample.weights.iter().filter(|(v, _)| *v == vertex).map(|(_, w)| w).sum();
         assert!((weight - 1.0).abs() < 1e-9);
     }

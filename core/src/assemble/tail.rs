@@ -71,30 +71,38 @@ impl Tail<'_> {
             forces.clear();
             forces.resize(3 * n, 0.0);
             term.effect.add_gradient(local, forces);
-            for (at, index) in self.unknowns(term, local.group).into_iter().enumerate() {
+            for (force, index) in forces.iter().zip(self.unknowns(term, local.group)) {
                 if let Some(index) = index {
-                    out[index] += forces[at];
+                    out[index] += force;
                 }
             }
         });
         out
     }
 
-    /// Their Hessian (mN/mm), row by row, the lower triangle.
-    pub fn hessian(&self, positions: &[f64], stresses: Stresses, scratch: &mut Scratch, out: &mut Vec<f64>) {
+    /// Adds `factor` times their Hessian (mN/mm) to the lower triangle of `out`, column by column.
+    pub fn add_hessian(
+        &self,
+        positions: &[f64],
+        stresses: Stresses,
+        factor: f64,
+        scratch: &mut Scratch,
+        out: &mut [f64],
+    ) {
         let size = self.dofs.tail + 3;
-        out.clear();
-        out.resize(size * size, 0.0);
+        let mut unknowns = Vec::new();
         self.for_each_active(positions, stresses, scratch, |_, term, local, _, matrix| {
             let n = 3 * term.stencils.group_size;
             matrix.clear();
             matrix.resize(n * n, 0.0);
             term.effect.add_hessian(local, matrix);
-            let unknowns = self.unknowns(term, local.group);
-            for (at, row) in unknowns.iter().enumerate() {
-                for (value, column) in matrix[at * n..=at * n + at].iter().zip(&unknowns) {
-                    if let (Some(row), Some(column)) = (row, column) {
-                        out[row.max(column) * size + row.min(column)] += value;
+            unknowns.clear();
+            unknowns.extend(self.unknowns(term, local.group).map(|index| index.unwrap_or(usize::MAX)));
+            for (at, &row) in unknowns.iter().enumerate() {
+                for (value, &column) in matrix[at * n..=at * n + at].iter().zip(&unknowns) {
+                    let (low, high) = (row.min(column), row.max(column));
+                    if high != usize::MAX {
+                        out[low * size + high] += factor * value;
                     }
                 }
             }
@@ -112,8 +120,8 @@ impl Tail<'_> {
     }
 
     /// Number within the tail of each unknown of a group, component-major; `None` for what is fixed.
-    fn unknowns(&self, term: &Term, group: usize) -> Vec<Option<usize>> {
+    fn unknowns<'b>(&'b self, term: &'b Term, group: usize) -> impl Iterator<Item = Option<usize>> + 'b {
         let vertices = term.stencils.group(group);
-        (0..3).flat_map(|k| vertices.iter().map(move |&vertex| self.dofs.in_tail(vertex as usize, k))).collect()
+        (0..3).flat_map(move |k| vertices.iter().map(move |&vertex| self.dofs.in_tail(vertex as usize, k)))
     }
 }

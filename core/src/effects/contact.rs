@@ -10,11 +10,17 @@
 //! The penetration at pressure p is p/k: [`Contact::stiffness_kpa_per_mm`] is chosen where the mesh is known.
 //! Not here: friction, search for candidate faces beyond a bounding sphere.
 
-use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+mod face_rule;
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, Rotation3, Vector3};
 
 use crate::effect::{Effect, Local, Stencils};
-use crate::mesh::element::{FACE_NODES, TOP_NODES, gauss_rule, shapes};
-use crate::needle::Body;
+use crate::mesh::element::FACE_NODES;
+use crate::needle::{Body, SignedDistance};
+use face_rule::FaceRule;
+pub use face_rule::{FaceStiffness, GROUP};
 
 /// Name of the effect.
 pub const NAME: &str = "contact";
@@ -22,8 +28,7 @@ pub const NAME: &str = "contact";
 /// Surface faces at rest: interpolation and area at their quadrature points.
 #[derive(Clone, Debug)]
 pub struct ContactFaces {
-    /// Shape function values, indexed (point, node).
-    values: Vec<f64>,
+    rule: Arc<FaceRule>,
     /// Quadrature weight × rest area (mm²), indexed (face, point).
     areas: Vec<f64>,
     /// Quadrature points per face.
@@ -34,22 +39,12 @@ impl ContactFaces {
     /// Faces ζ = 1 of elements, whose nodes are the first vertices of each group of `stencils` (the
     /// last one is the needle), at the rest positions `rest`; `points_per_edge` Gauss points in each direction.
     pub fn new(stencils: &Stencils, rest: &[f64], points_per_edge: usize) -> Self {
-        let top = &*TOP_NODES;
-        let rule = gauss_rule(points_per_edge);
-        let mut values = Vec::new();
-        let mut slopes = Vec::new();
-        for &(eta, w_eta) in &rule {
-            for &(xi, w_xi) in &rule {
-                let shape = shapes([xi, eta, 1.0]);
-                values.extend(top.iter().map(|&a| shape[a].value));
-                slopes.push((w_xi * w_eta, top.iter().map(|&a| shape[a].gradient).collect::<Vec<_>>()));
-            }
-        }
+        let rule = FaceRule::shared(points_per_edge);
         let mut local = vec![0.0; 3 * stencils.group_size];
-        let mut areas = Vec::with_capacity(stencils.len() * slopes.len());
+        let mut areas = Vec::with_capacity(stencils.len() * rule.slopes.len());
         for face in 0..stencils.len() {
             stencils.gather(face, rest, &mut local);
-            for (weight, gradients) in &slopes {
+            for (weight, gradients) in &rule.slopes {
                 let mut tangents = [Vector3::zeros(); 2];
                 for (a, gradient) in gradients.iter().enumerate() {
                     let vertex = Vector3::from_fn(|k, _| local[k * stencils.group_size + a]);
@@ -59,17 +54,27 @@ impl ContactFaces {
                 areas.push(weight * tangents[0].cross(&tangents[1]).norm());
             }
         }
-        ContactFaces { values, areas, points: slopes.len() }
+        ContactFaces { areas, points: rule.slopes.len(), rule }
     }
 
     /// Values of the face's shape functions at one quadrature point.
     pub fn values(&self, point: usize) -> &[f64] {
-        &self.values[point * FACE_NODES..(point + 1) * FACE_NODES]
+        &self.rule.weights[point][..FACE_NODES]
+    }
+
+    /// What the offset of one quadrature point from the needle is made of: weights of the face's nodes, and −1 for the needle.
+    pub fn weights(&self, point: usize) -> &[f64; GROUP] {
+        &self.rule.weights[point]
     }
 
     /// Weight × rest area of the quadrature points of one face (mm²).
     pub fn areas(&self, face: usize) -> &[f64] {
         &self.areas[face * self.points..(face + 1) * self.points]
+    }
+
+    /// The Hessian of one face, to be summed over its points.
+    pub fn stiffness(&self) -> FaceStiffness<'_> {
+        FaceStiffness::new(&self.rule)
     }
 }
 
@@ -115,54 +120,50 @@ impl Contact<'_> {
     }
 
     fn tip(&self, local: &Local) -> Vector3<f64> {
-        let n = FACE_NODES + 1;
-        Vector3::new(local.current[n - 1], local.current[2 * n - 1], local.current[3 * n - 1])
+        vertex(local, FACE_NODES)
     }
 
-    fn node(&self, local: &Local, a: usize) -> Vector3<f64> {
-        let n = FACE_NODES + 1;
-        Vector3::new(local.current[a], local.current[n + a], local.current[2 * n + a])
+    /// A face's nodes in needle coordinates.
+    fn nodes_in_needle(&self, local: &Local) -> [Vector3<f64>; FACE_NODES] {
+        let (tip, needle_from_frame) = (self.tip(local), self.frame_from_needle.inverse());
+        std::array::from_fn(|a| needle_from_frame * (vertex(local, a) - tip))
     }
 
-    /// The quadrature point's position in needle coordinates.
-    fn in_needle(&self, local: &Local, point: usize) -> Point3<f64> {
-        let mut offset = -self.tip(local);
-        for (a, value) in self.faces.values(point).iter().enumerate() {
-            offset += self.node(local, a) * *value;
+    /// A quadrature point's position in needle coordinates.
+    fn in_needle(&self, nodes: &[Vector3<f64>; FACE_NODES], point: usize) -> Point3<f64> {
+        let mut at = Vector3::zeros();
+        for (node, value) in nodes.iter().zip(self.faces.values(point)) {
+            at += node * *value;
         }
-        Point3::from(self.frame_from_needle.inverse_transform_vector(&offset))
+        Point3::from(at)
     }
 
     /// Gap, pressure and position of every quadrature point of a face.
     pub fn contact_points<'b>(&'b self, local: &'b Local) -> impl Iterator<Item = ContactPoint> + 'b {
+        let nodes = self.nodes_in_needle(local);
         self.faces.areas(local.group).iter().enumerate().map(move |(point, &area_mm2)| {
-            let at = self.in_needle(local, point);
+            let at = self.in_needle(&nodes, point);
             let gap_mm = self.shape.distance(&at);
             let position = Point3::from(self.frame_from_needle * at.coords + self.tip(local));
             ContactPoint { gap_mm, pressure_kpa: -self.penalty(gap_mm).1, area_mm2, position }
         })
     }
 
-    /// Calls `visit(weights, area, force, stiffness)` for each point in contact: `weights` are the interpolation weights of the
-    /// group's vertices (the needle's is −1), `force` = φ′∇g and `stiffness` = ∂²φ/∂x², both per rest area.
-    fn for_each_touching(&self, local: &Local, mut visit: impl FnMut(&[f64], f64, Vector3<f64>, Matrix3<f64>)) {
-        let rotation = self.frame_from_needle.matrix();
-        let mut weights = [-1.0; FACE_NODES + 1];
+    /// Calls `visit(point, its area, its signed distance)` for each point of the face in contact.
+    fn for_each_touching(&self, local: &Local, mut visit: impl FnMut(usize, f64, SignedDistance)) {
+        let nodes = self.nodes_in_needle(local);
         for (point, &area) in self.faces.areas(local.group).iter().enumerate() {
-            let at = self.in_needle(local, point);
-            if self.shape.distance(&at) >= self.smoothing_mm {
-                continue;
+            let at = self.in_needle(&nodes, point);
+            if self.shape.distance(&at) < self.smoothing_mm {
+                visit(point, area, self.shape.signed_distance(&at));
             }
-            let distance = self.shape.signed_distance(&at);
-            let (_, slope, curvature) = self.penalty(distance.value);
-            let normal = rotation * distance.gradient;
-            let bending = rotation * distance.hessian * rotation.transpose();
-            weights[..FACE_NODES].copy_from_slice(self.faces.values(point));
-            let bending_slope = local.predicted.get(point).copied().unwrap_or(slope);
-            let stiffness = normal * normal.transpose() * curvature + bending * bending_slope;
-            visit(&weights, area, normal * slope, stiffness);
         }
     }
+}
+
+/// Position of one vertex of a group.
+fn vertex(local: &Local, a: usize) -> Vector3<f64> {
+    Vector3::new(local.current[a], local.current[GROUP + a], local.current[2 * GROUP + a])
 }
 
 impl Effect for Contact<'_> {
@@ -171,9 +172,9 @@ impl Effect for Contact<'_> {
     }
 
     fn is_active(&self, local: &Local) -> bool {
-        let n = FACE_NODES;
-        let center = (0..n).map(|a| self.node(local, a)).sum::<Vector3<f64>>() / n as f64;
-        let radius = (0..n).map(|a| (self.node(local, a) - center).norm()).fold(0.0, f64::max);
+        let nodes: [Vector3<f64>; FACE_NODES] = std::array::from_fn(|a| vertex(local, a));
+        let center = nodes.iter().sum::<Vector3<f64>>() / FACE_NODES as f64;
+        let radius = nodes.iter().map(|node| (node - center).norm_squared()).fold(0.0, f64::max).sqrt();
         let at = Point3::from(self.frame_from_needle.inverse_transform_vector(&(center - self.tip(local))));
         self.shape.distance(&at) < BOUNDING_MARGIN * radius + self.smoothing_mm
     }
@@ -183,51 +184,50 @@ impl Effect for Contact<'_> {
     }
 
     fn predict_stress(&self, local: &Local, step: &[f64], out: &mut [f64]) {
-        let n = FACE_NODES + 1;
+        let nodes = self.nodes_in_needle(local);
         for (point, predicted) in out.iter_mut().enumerate() {
-            let distance = self.shape.signed_distance(&self.in_needle(local, point));
+            let distance = self.shape.signed_distance(&self.in_needle(&nodes, point));
             let (_, slope, curvature) = self.penalty(distance.value);
             let normal = self.frame_from_needle * distance.gradient;
-            let values = self.faces.values(point).iter().chain(&[-1.0]);
-            let closing: f64 = values
+            let closing: f64 = self
+                .faces
+                .weights(point)
+                .iter()
                 .enumerate()
-                .map(|(a, value)| value * (0..3).map(|k| normal[k] * step[k * n + a]).sum::<f64>())
+                .map(|(a, value)| value * (0..3).map(|k| normal[k] * step[k * GROUP + a]).sum::<f64>())
                 .sum();
             *predicted = (slope + curvature * closing).min(0.0);
         }
     }
 
     fn energy(&self, local: &Local) -> f64 {
+        let nodes = self.nodes_in_needle(local);
         let areas = self.faces.areas(local.group).iter().enumerate();
-        areas.map(|(point, area)| area * self.penalty(self.shape.distance(&self.in_needle(local, point))).0).sum()
+        areas.map(|(point, area)| area * self.penalty(self.shape.distance(&self.in_needle(&nodes, point))).0).sum()
     }
 
     fn add_gradient(&self, local: &Local, out: &mut [f64]) {
-        let n = FACE_NODES + 1;
-        self.for_each_touching(local, |weights, area, force, _| {
-            for k in 0..3 {
-                for (a, weight) in weights.iter().enumerate() {
-                    out[k * n + a] += area * weight * force[k];
+        self.for_each_touching(local, |point, area, distance| {
+            let force = self.frame_from_needle * distance.gradient * (area * self.penalty(distance.value).1);
+            for (k, out) in out.as_chunks_mut::<GROUP>().0.iter_mut().enumerate() {
+                for (out, weight) in out.iter_mut().zip(self.faces.weights(point)) {
+                    *out += weight * force[k];
                 }
             }
         });
     }
 
     fn add_hessian(&self, local: &Local, out: &mut [f64]) {
-        let n = FACE_NODES + 1;
-        self.for_each_touching(local, |weights, area, _, stiffness| {
-            for i in 0..3 {
-                for (a, weight_a) in weights.iter().enumerate() {
-                    for j in 0..=i {
-                        let scale = area * weight_a * stiffness[(i, j)];
-                        let row = &mut out[(i * n + a) * 3 * n + j * n..][..n];
-                        for (entry, weight_b) in row.iter_mut().zip(weights) {
-                            *entry += scale * weight_b;
-                        }
-                    }
-                }
-            }
+        let rotation = self.frame_from_needle.matrix();
+        let mut stiffness = self.faces.stiffness();
+        self.for_each_touching(local, |point, area, distance| {
+            let (_, slope, curvature) = self.penalty(distance.value);
+            let normal = distance.gradient;
+            let bending_slope = local.predicted.get(point).copied().unwrap_or(slope);
+            let of_point = normal * normal.transpose() * curvature + distance.hessian * bending_slope;
+            stiffness.add(point, &(rotation * (of_point * area) * rotation.transpose()));
         });
+        stiffness.add_to(out);
     }
 }
 

@@ -7,7 +7,9 @@
 use nalgebra::Matrix3;
 
 use super::finite_strain::Lame;
-use super::solid::{Energy, Gradient, Hessian, SolidEnergy, SolidGeometry, StiffnessCoefficients, run_kernel};
+use super::solid::{
+    Energy, Gradient, Hessian, SolidEnergy, SolidGeometry, StiffnessCoefficients, Volumetric, run_kernel,
+};
 use crate::effect::{Effect, Local};
 use crate::mesh::element::{NODES, POINTS};
 
@@ -64,17 +66,20 @@ impl SolidEnergy for Elasticity<'_> {
     #[inline(always)]
     fn add_hessian_n(&self, local: &Local, out: &mut [f64]) {
         let material = &self.materials[local.group];
-        let mut gradients = [[[0.0; NODES]; 3]; POINTS];
         let mut coefficients = [StiffnessCoefficients::default(); POINTS];
-        let mut volumetric = [0.0; POINTS];
+        let mut volumetric = Volumetric { dilatation_gradient: [[[0.0; NODES]; POINTS]; 3], stiffness: [0.0; POINTS] };
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
-            gradients[q].copy_from_slice(self.geometry.gradients(local.group, q));
+            for (rows, gradient) in
+                volumetric.dilatation_gradient.iter_mut().zip(self.geometry.gradients(local.group, q))
+            {
+                rows[q] = *gradient;
+            }
             let shear = weight * material.mu;
             coefficients[q] = StiffnessCoefficients { rest: shear, cross: shear, outer: 0.0 };
-            volumetric[q] = weight * material.lambda;
+            volumetric.stiffness[q] = weight * material.lambda;
         }
-        self.geometry.add_stiffness(local.group, &gradients, &coefficients, out);
-        self.geometry.add_volumetric_stiffness(local.group, &gradients, &volumetric, out);
+        let gradients = &volumetric.dilatation_gradient;
+        self.geometry.add_stiffness(local.group, gradients, &coefficients, Some(&volumetric), out);
     }
 }
 

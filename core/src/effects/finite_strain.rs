@@ -14,8 +14,8 @@
 use nalgebra::Matrix3;
 
 use super::solid::{
-    ElementKernel, Energy, Gradient, Hessian, MaxStep, NodeRows, SolidEnergy, SolidGeometry, StiffnessCoefficients,
-    determinant_and_cofactor, push_forward, run_kernel,
+    ElementKernel, Energy, Gradient, Hessian, MaxStep, PointRows, SolidEnergy, SolidGeometry, StiffnessCoefficients,
+    Volumetric, determinant_and_cofactor, push_forward, run_kernel,
 };
 use crate::effect::{Effect, Local};
 use crate::mesh::element::{NODES, POINTS};
@@ -114,20 +114,19 @@ impl FiniteStrain<'_> {
 
     /// The part −2/3 µ J^(−2/3) (fₐᵢ g_bⱼ + gₐᵢ f_bⱼ), f = F G, that only the isochoric energy has.
     #[inline(always)]
-    fn add_mixed(&self, local: &Local, points: &Points, spatial: &[NodeRows; POINTS], out: &mut [f64]) {
+    fn add_mixed(&self, local: &Local, points: &Points, spatial: &PointRows, out: &mut [f64]) {
         let mu = self.materials[local.group].mu;
         let rows = out.as_chunks_mut::<NODES>().0;
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
-            let mut pushed = [[0.0; NODES]; 3];
-            push_forward(&points.f[q], self.geometry.gradients(local.group, q), &mut pushed);
+            let mut pushed = [[[0.0; NODES]; POINTS]; 3];
+            push_forward(&points.f[q], self.geometry.gradients(local.group, q), q, &mut pushed);
             let scale = -2.0 / 3.0 * weight * mu * points.j[q].powf(-2.0 / 3.0);
-            let g = &spatial[q];
             for i in 0..3 {
                 for a in 0..NODES {
                     for j in 0..=i {
                         let row = &mut rows[(i * NODES + a) * 3 + j];
                         for b in 0..NODES {
-                            row[b] += scale * (pushed[i][a] * g[j][b] + g[i][a] * pushed[j][b]);
+                            row[b] += scale * (pushed[i][q][a] * spatial[j][q][b] + spatial[i][q][a] * pushed[j][q][b]);
                         }
                     }
                 }
@@ -212,17 +211,16 @@ impl SolidEnergy for FiniteStrain<'_> {
             pressure.copy_from_slice(local.predicted);
         }
         let material = &self.materials[local.group];
-        let mut spatial = [[[0.0; NODES]; 3]; POINTS];
-        let mut dilatation = [[[0.0; NODES]; 3]; POINTS];
+        let mut spatial = [[[0.0; NODES]; POINTS]; 3];
         let mut coefficients = [StiffnessCoefficients::default(); POINTS];
-        let mut volumetric = [0.0; POINTS];
+        let mut volumetric = Volumetric { dilatation_gradient: [[[0.0; NODES]; POINTS]; 3], stiffness: [0.0; POINTS] };
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
             let rest = self.geometry.gradients(local.group, q);
-            push_forward(&points.f_inverse_transposed[q], rest, &mut spatial[q]);
+            push_forward(&points.f_inverse_transposed[q], rest, q, &mut spatial);
             let j = points.j[q];
             for k in 0..3 {
                 for a in 0..NODES {
-                    dilatation[q][k][a] = j * spatial[q][k][a];
+                    volumetric.dilatation_gradient[k][q][a] = j * spatial[k][q][a];
                 }
             }
             let pj = pressure[q] * j;
@@ -242,10 +240,9 @@ impl SolidEnergy for FiniteStrain<'_> {
                     }
                 }
             };
-            volumetric[q] = weight * self.volumetric(material, points.theta[q]).2;
+            volumetric.stiffness[q] = weight * self.volumetric(material, points.theta[q]).2;
         }
-        self.geometry.add_stiffness(local.group, &spatial, &coefficients, out);
-        self.geometry.add_volumetric_stiffness(local.group, &dilatation, &volumetric, out);
+        self.geometry.add_stiffness(local.group, &spatial, &coefficients, Some(&volumetric), out);
         if self.law == NeoHookean::Isochoric {
             self.add_mixed(local, &points, &spatial, out);
         }

@@ -17,7 +17,7 @@
 
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
-use super::contact::ContactFaces;
+use super::contact::{ContactFaces, GROUP};
 use crate::effect::{Effect, Local};
 use crate::mesh::element::FACE_NODES;
 use crate::needle::Body;
@@ -141,18 +141,12 @@ impl Friction<'_> {
         })
     }
 
-    /// Calls `visit(weights of the nodes and of the tip, force on the tissue, stiffness)` for every rubbing point.
-    fn for_each(&self, local: &Local, mut visit: impl FnMut(&[f64; FACE_NODES + 1], Vector3<f64>, Matrix3<f64>)) {
-        let mut weights = [-1.0; FACE_NODES + 1];
+    /// Calls `visit(rubbing point, slip, f₁(y)/y, f₁′)` for every rubbing point of a face.
+    fn for_each(&self, local: &Local, mut visit: impl FnMut(&RubbingPoint, Vector3<f64>, f64, f64)) {
         for rubbing in &self.points[local.group] {
             let slip = self.slip(local, rubbing);
-            let y = slip.norm();
-            let (_, over, slope) = self.smoothed(y);
-            let along = slip.try_normalize(0.0).unwrap_or_default();
-            let tangent = Matrix3::identity() - rubbing.normal * rubbing.normal.transpose();
-            let stiffness = tangent * over + along * along.transpose() * (slope - over);
-            weights[..FACE_NODES].copy_from_slice(self.faces.values(rubbing.point));
-            visit(&weights, slip * (over * rubbing.limit_mn), stiffness * rubbing.limit_mn);
+            let (_, over, slope) = self.smoothed(slip.norm());
+            visit(rubbing, slip, over, slope);
         }
     }
 }
@@ -172,30 +166,24 @@ impl Effect for Friction<'_> {
     }
 
     fn add_gradient(&self, local: &Local, out: &mut [f64]) {
-        let n = FACE_NODES + 1;
-        self.for_each(local, |weights, force, _| {
-            for k in 0..3 {
-                for (a, weight) in weights.iter().enumerate() {
-                    out[k * n + a] += weight * force[k];
+        self.for_each(local, |rubbing, slip, over, _| {
+            let force = slip * (over * rubbing.limit_mn);
+            for (k, out) in out.as_chunks_mut::<GROUP>().0.iter_mut().enumerate() {
+                for (out, weight) in out.iter_mut().zip(self.faces.weights(rubbing.point)) {
+                    *out += weight * force[k];
                 }
             }
         });
     }
 
     fn add_hessian(&self, local: &Local, out: &mut [f64]) {
-        let n = FACE_NODES + 1;
-        self.for_each(local, |weights, _, stiffness| {
-            for i in 0..3 {
-                for (a, weight_a) in weights.iter().enumerate() {
-                    for j in 0..=i {
-                        let scale = weight_a * stiffness[(i, j)];
-                        let row = &mut out[(i * n + a) * 3 * n + j * n..][..n];
-                        for (entry, weight_b) in row.iter_mut().zip(weights) {
-                            *entry += scale * weight_b;
-                        }
-                    }
-                }
-            }
+        let mut stiffness = self.faces.stiffness();
+        self.for_each(local, |rubbing, slip, over, slope| {
+            let along = slip.try_normalize(0.0).unwrap_or_default();
+            let tangent = Matrix3::identity() - rubbing.normal * rubbing.normal.transpose();
+            let of_point = tangent * over + along * along.transpose() * (slope - over);
+            stiffness.add(rubbing.point, &(of_point * rubbing.limit_mn));
         });
+        stiffness.add_to(out);
     }
 }

@@ -7,17 +7,18 @@
 //! Loops have compile-time lengths and run under the widest vector instructions of the machine (`run_kernel`).
 //! Not here: any material, any mesh topology.
 
+pub(super) mod products;
+mod stiffness;
+
 use nalgebra::{Matrix3, Matrix4, Vector4};
 use thiserror::Error;
 
 use crate::effect::{Local, Stencils};
 use crate::mesh::element::{MODES, NODES, POINTS, QUADRATURE};
+pub use stiffness::{PointRows, StiffnessCoefficients, Volumetric};
 
 /// One number per node for each component: a row of shape function gradients.
 pub type NodeRows = [[f64; NODES]; 3];
-
-/// Component pairs (row, column) of the lower block triangle of an element matrix.
-const BLOCKS: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 /// A step may shrink no element's volume at a point below this fraction of what it was.
 const SMALLEST_VOLUME_RATIO: f64 = 0.1;
@@ -173,102 +174,6 @@ impl SolidGeometry {
             }
         }
     }
-
-    /// Adds the point-wise part of the element matrix (lower triangle) for the given coefficients, quadrature weight included.
-    #[inline(always)]
-    pub fn add_stiffness(
-        &self,
-        element: usize,
-        spatial: &[NodeRows; POINTS],
-        coefficients: &[StiffnessCoefficients; POINTS],
-        out: &mut [f64],
-    ) {
-        let rows = out.as_chunks_mut::<NODES>().0;
-        for a in 0..NODES {
-            // One pass over the points for all blocks of this row, so that gradients are loaded once.
-            let mut isotropic = [0.0; NODES];
-            let mut blocks = [[0.0; NODES]; BLOCKS.len()];
-            for q in 0..POINTS {
-                let (rest, g, c) = (self.gradients(element, q), &spatial[q], &coefficients[q]);
-                let scale = [0, 1, 2].map(|k| c.rest * rest[k][a]);
-                let cross = [0, 1, 2].map(|k| c.cross * g[k][a]);
-                let outer = [0, 1, 2].map(|k| c.outer * g[k][a]);
-                for b in 0..NODES {
-                    isotropic[b] += scale[0] * rest[0][b] + scale[1] * rest[1][b] + scale[2] * rest[2][b];
-                    for (block, &(i, j)) in blocks.iter_mut().zip(&BLOCKS) {
-                        block[b] = g[i][b].mul_add(cross[j], g[j][b].mul_add(outer[i], block[b]));
-                    }
-                }
-            }
-            for (block, &(i, j)) in blocks.iter().zip(&BLOCKS) {
-                let row = &mut rows[(i * NODES + a) * 3 + j];
-                for b in 0..NODES {
-                    row[b] += block[b] + if i == j { isotropic[b] } else { 0.0 };
-                }
-            }
-        }
-    }
-
-    /// Adds the volumetric part of the element matrix (lower triangle): Σ_q w U″(θ_q) ∇θ_q ⊗ ∇θ_q, with θ the projected
-    /// dilatation whose gradient at the points is `dilatation_gradient` (∂J/∂x) and `stiffness[q]` = w U″.
-    #[inline(always)]
-    pub fn add_volumetric_stiffness(
-        &self,
-        element: usize,
-        dilatation_gradient: &[NodeRows; POINTS],
-        stiffness: &[f64; POINTS],
-        out: &mut [f64],
-    ) {
-        let mut integrals = [[[0.0; NODES]; 3]; MODES];
-        let mut core = Matrix4::zeros();
-        for (q, weight) in self.weights(element).iter().enumerate() {
-            let modes = &self.mode_values[q];
-            for m in 0..MODES {
-                for k in 0..3 {
-                    for a in 0..NODES {
-                        integrals[m][k][a] += weight * modes[m] * dilatation_gradient[q][k][a];
-                    }
-                }
-                for l in 0..MODES {
-                    core[(m, l)] += stiffness[q] * modes[m] * modes[l];
-                }
-            }
-        }
-        let core = self.mode_inverse[element] * core * self.mode_inverse[element];
-        let mut scaled = [[[0.0; NODES]; 3]; MODES];
-        for m in 0..MODES {
-            for l in 0..MODES {
-                for k in 0..3 {
-                    for a in 0..NODES {
-                        scaled[m][k][a] += core[(m, l)] * integrals[l][k][a];
-                    }
-                }
-            }
-        }
-        let rows = out.as_chunks_mut::<NODES>().0;
-        for &(i, j) in &BLOCKS {
-            for a in 0..NODES {
-                let scale = [0, 1, 2, 3].map(|m| scaled[m][i][a]);
-                let row = &mut rows[(i * NODES + a) * 3 + j];
-                for b in 0..NODES {
-                    let first = integrals[0][j][b].mul_add(scale[0], row[b]);
-                    let second = integrals[1][j][b].mul_add(scale[1], integrals[2][j][b] * scale[2]);
-                    row[b] = integrals[3][j][b].mul_add(scale[3], first) + second;
-                }
-            }
-        }
-    }
-}
-
-/// Coefficients of the point-wise stiffness, quadrature weight included (mN·mm).
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StiffnessCoefficients {
-    /// Multiplies δᵢⱼ Gₐ·G_b.
-    pub rest: f64,
-    /// Multiplies gₐⱼ g_bᵢ.
-    pub cross: f64,
-    /// Multiplies gₐᵢ g_bⱼ.
-    pub outer: f64,
 }
 
 /// Sum of products in four interleaved parts, so that it vectorises.
@@ -291,12 +196,12 @@ pub(super) fn determinant_and_cofactor(f: &Matrix3<f64>) -> (f64, Matrix3<f64>) 
     (c0.dot(&cofactor.column(0)), cofactor)
 }
 
-/// `out` = matrix × gradients, node by node.
+/// `out` at `point` = matrix × gradients, node by node.
 #[inline(always)]
-pub(super) fn push_forward(matrix: &Matrix3<f64>, gradients: &NodeRows, out: &mut NodeRows) {
+pub(super) fn push_forward(matrix: &Matrix3<f64>, gradients: &NodeRows, point: usize, out: &mut PointRows) {
     for i in 0..3 {
         for a in 0..NODES {
-            out[i][a] =
+            out[i][point][a] =
                 matrix[(i, 0)] * gradients[0][a] + matrix[(i, 1)] * gradients[1][a] + matrix[(i, 2)] * gradients[2][a];
         }
     }

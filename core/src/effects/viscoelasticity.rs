@@ -16,6 +16,7 @@
 
 use nalgebra::Matrix3;
 
+use super::solid::products::add_products;
 use super::solid::{
     Energy, Gradient, Hessian, MaxStep, SolidEnergy, SolidGeometry, StiffnessCoefficients, determinant_and_cofactor,
     push_forward, run_kernel,
@@ -237,30 +238,28 @@ impl SolidEnergy for Viscoelasticity<'_> {
     #[inline(always)]
     fn add_hessian_n(&self, local: &Local, out: &mut [f64]) {
         let Some((_, inverse, _)) = self.points(local) else { return };
-        let mut spatial = [[[0.0; NODES]; 3]; POINTS];
-        let mut pulled = [[[0.0; NODES]; 3]; POINTS];
+        let mut spatial = [[[0.0; NODES]; POINTS]; 3];
+        let mut pulled = [[[0.0; NODES]; POINTS]; 3];
         let mut coefficients = [StiffnessCoefficients::default(); POINTS];
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
             let rest = self.geometry.gradients(local.group, q);
             let scale = weight * self.shear_kpa[local.group];
-            push_forward(&inverse[q], rest, &mut spatial[q]);
-            push_forward(&(self.pull(local.group, q) * scale), rest, &mut pulled[q]);
+            push_forward(&inverse[q], rest, q, &mut spatial);
+            push_forward(&(self.pull(local.group, q) * scale), rest, q, &mut pulled);
             coefficients[q].cross = scale * self.barrier;
         }
-        self.geometry.add_stiffness(local.group, &spatial, &coefficients, out);
+        self.geometry.add_stiffness(local.group, &spatial, &coefficients, None, out);
+        let mut isotropic = [[0.0; NODES]; NODES];
+        for q in 0..POINTS {
+            for (pulled, rest) in pulled.iter().zip(self.geometry.gradients(local.group, q)) {
+                add_products([(&pulled[q..=q], std::slice::from_ref(rest))], &mut isotropic);
+            }
+        }
         let rows = out.as_chunks_mut::<NODES>().0;
         for a in 0..NODES {
-            let mut isotropic = [0.0; NODES];
-            for q in 0..POINTS {
-                let rest = self.geometry.gradients(local.group, q);
-                let scale = [0, 1, 2].map(|k| pulled[q][k][a]);
-                for b in 0..NODES {
-                    isotropic[b] += scale[0] * rest[0][b] + scale[1] * rest[1][b] + scale[2] * rest[2][b];
-                }
-            }
             for i in 0..3 {
                 for b in 0..NODES {
-                    rows[(i * NODES + a) * 3 + i][b] += isotropic[b];
+                    rows[(i * NODES + a) * 3 + i][b] += isotropic[a][b];
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! Reads the deformed inner surface at points given by their patch parameters.
 
-use super::element::{TOP_NODES, shapes};
+use super::element::{FACE_NODES, TOP_NODES, shapes};
 use super::wall::{WallGeometry, WallTopology};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -13,30 +13,53 @@ pub struct SurfaceSample {
 
 /// Newton steps that invert a face's map (it is nearly affine, so a few suffice).
 const INVERSION_STEPS: usize = 12;
+/// How far a face's curved edges may bulge beyond its nodes, as a share of its size.
+const BULGE: f64 = 0.25;
 /// How far outside a face's reference square a point may lie and still belong to it.
 const EDGE_TOLERANCE: f64 = 1e-9;
 
-/// Locates the point `at` (patch parameters) on the mesh's inner surface; `None` beyond the rim.
-pub fn locate(topology: &WallTopology, geometry: &WallGeometry, at: [f64; 2]) -> Option<SurfaceSample> {
-    topology.face_points.iter().find_map(|face| {
-        let nodes: Vec<[f64; 2]> =
-            face.iter().map(|&vertex| geometry.parameters[topology.vertices[vertex].0]).collect();
-        let inside_box = (0..2).all(|k| {
-            let (low, high) =
-                nodes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), n| (l.min(n[k]), h.max(n[k])));
-            let margin = 0.25 * (high - low);
-            at[k] >= low - margin && at[k] <= high + margin
-        });
-        if !inside_box {
-            return None;
-        }
-        let weights = invert(&nodes, at)?;
-        Some(SurfaceSample { weights: face.iter().copied().zip(weights).collect() })
-    })
+/// Finds points on the inner surface of one mesh.
+pub struct SurfaceLocator<'a> {
+    topology: &'a WallTopology,
+    faces: Vec<Face>,
+}
+
+/// A face in the plane of the patch parameters.
+struct Face {
+    nodes: [[f64; 2]; FACE_NODES],
+    /// Bounds within which its points lie.
+    bounds: [(f64, f64); 2],
+}
+
+impl<'a> SurfaceLocator<'a> {
+    /// For the inner surface of this mesh.
+    pub fn new(topology: &'a WallTopology, geometry: &WallGeometry) -> Self {
+        let face = |vertices: &Vec<usize>| {
+            let nodes = std::array::from_fn(|a| geometry.parameters[topology.vertices[vertices[a]].0]);
+            let bounds = [0, 1].map(|k| {
+                let (low, high) = nodes
+                    .iter()
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), n: &[f64; 2]| (l.min(n[k]), h.max(n[k])));
+                let margin = BULGE * (high - low);
+                (low - margin, high + margin)
+            });
+            Face { nodes, bounds }
+        };
+        SurfaceLocator { topology, faces: topology.face_points.iter().map(face).collect() }
+    }
+
+    /// Locates the point `at` (patch parameters); `None` beyond the rim.
+    pub fn locate(&self, at: [f64; 2]) -> Option<SurfaceSample> {
+        self.topology.face_points.iter().zip(&self.faces).find_map(|(vertices, face)| {
+            let is_near = (0..2).all(|k| (face.bounds[k].0..=face.bounds[k].1).contains(&at[k]));
+            let weights = is_near.then(|| invert(&face.nodes, at))??;
+            Some(SurfaceSample { weights: vertices.iter().copied().zip(weights).collect() })
+        })
+    }
 }
 
 /// Shape function values at the point of the face whose image is `at`, if it lies in the face.
-fn invert(nodes: &[[f64; 2]], at: [f64; 2]) -> Option<Vec<f64>> {
+fn invert(nodes: &[[f64; 2]; FACE_NODES], at: [f64; 2]) -> Option<[f64; FACE_NODES]> {
     let top = &*TOP_NODES;
     let mut local = Vector2::zeros();
     for _ in 0..INVERSION_STEPS {
@@ -60,7 +83,7 @@ fn invert(nodes: &[[f64; 2]], at: [f64; 2]) -> Option<Vec<f64>> {
         }
         if step.amax() < 1e-13 {
             let inside = local.amax() <= 1.0 + EDGE_TOLERANCE;
-            return inside.then(|| on_face().map(|s| s.value).collect());
+            return inside.then(|| top.map(|a| shapes[a].value));
         }
     }
     None

@@ -16,7 +16,7 @@ use adhesion::Pull;
 use friction::Sliding;
 use tool_flex::Bending;
 
-/// Error that `auto` accepts for leaving an effect out (µm): a tenth of the best published tool-to-layer error (9 µm).
+/// Error that `auto` accepts for leaving an effect out where nothing else is asked for (µm): a tenth of the best published tool-to-layer error (9 µm).
 pub const AUTO_TOLERANCE_UM: f64 = 1.0;
 
 /// Why one prediction leaves out what depends on rate: its load lasts.
@@ -104,9 +104,9 @@ pub fn decide(
 ) -> Result<Decision, PredictError> {
     // A strain ε changes the answer by the order of ε times itself.
     let linearisation_error_um = expected.strain * expected.depth_mm * 1e3;
-    let called_for = linearisation_error_um > AUTO_TOLERANCE_UM;
+    let called_for = linearisation_error_um > choice.tolerance_um();
     let (wanted, contact, why) = match choice {
-        EffectChoice::Auto => (called_for, true, None),
+        EffectChoice::Auto | EffectChoice::AutoWithin { .. } => (called_for, true, None),
         EffectChoice::All => (true, true, Some("asked for with `all`")),
         EffectChoice::Named(names) => {
             let has = |name: &str| names.iter().any(|n| n == name);
@@ -151,7 +151,7 @@ pub fn decide(
             simulated: finite,
             reason,
             value: Some(linearisation_error_um),
-            threshold: Some(AUTO_TOLERANCE_UM),
+            threshold: Some(choice.tolerance_um()),
         },
         plain(
             contact::NAME,

@@ -13,7 +13,7 @@ use crate::equilibrium::{
     Addition, ContactSettings, ContactSummary, Equilibrium, Load, MeshSize, Motion, Solid, Strains, Tool, Wall,
 };
 use crate::mesh::disc::DiscGeometry;
-use crate::mesh::sample::locate;
+use crate::mesh::sample::SurfaceLocator;
 use crate::mesh::wall::{Place, WallDivision, WallError, WallTopology};
 use crate::patch::Patch;
 use crate::progress::Progress;
@@ -343,7 +343,8 @@ impl Problem<'_> {
         let beyond = |parameter| settled.as_ref().map_or_else(Vector3::zeros, |settled| self.sunk(settled, parameter));
         let displacement: Vec<f64> =
             equilibrium.positions.iter().zip(&wall.geometry.rest).map(|(current, rest)| current - rest).collect();
-        let node = |&parameter: &[f64; 2]| match locate(wall.topology(), &wall.geometry, parameter) {
+        let surface = SurfaceLocator::new(wall.topology(), &wall.geometry);
+        let node = |&parameter: &[f64; 2]| match surface.locate(parameter) {
             Some(sample) => sample.interpolate(&displacement),
             None => beyond(parameter),
         };

@@ -200,7 +200,7 @@ impl Question<'_> {
             // What `decide` will find unless the sinking itself is small.
             let finite = match &self.request.effects {
                 EffectChoice::Named(names) => names.iter().any(|name| name == finite_strain::NAME),
-                EffectChoice::Auto | EffectChoice::All => true,
+                EffectChoice::Auto | EffectChoice::AutoWithin { .. } | EffectChoice::All => true,
             };
             let finite = finite && self.request.level != Level::Linear;
             let solid = if finite { Solid::FiniteStrain } else { Solid::Elasticity };

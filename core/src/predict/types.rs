@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use thiserror::Error;
 
+use super::choice::AUTO_TOLERANCE_UM;
 use super::expected_error::ExpectedError;
 use crate::equilibrium::error::EquilibriumError;
 use crate::mesh::wall::WallError;
@@ -57,16 +58,39 @@ pub enum Control {
 }
 
 /// Which effects to simulate.
-#[derive(Clone, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub enum EffectChoice {
-    /// Those that the scene calls for.
+    /// Those that the scene calls for: leaving out any other costs no more than [`AUTO_TOLERANCE_UM`].
     #[default]
     Auto,
+    /// Those that the scene calls for, with another tolerance.
+    AutoWithin {
+        /// Error that may be accepted for leaving an effect out (µm).
+        tolerance_um: f64,
+    },
     /// All that the level knows.
     All,
     /// These, by name.
     Named(Vec<String>),
 }
+
+impl EffectChoice {
+    /// What the scene calls for where all errors together may be `max_error_um` (µm).
+    pub fn auto_for(max_error_um: f64) -> Self {
+        EffectChoice::AutoWithin { tolerance_um: max_error_um * EFFECT_SHARE }
+    }
+
+    /// Error that may be accepted for leaving an effect out (µm).
+    pub fn tolerance_um(&self) -> f64 {
+        match self {
+            EffectChoice::AutoWithin { tolerance_um } => *tolerance_um,
+            EffectChoice::Auto | EffectChoice::All | EffectChoice::Named(_) => AUTO_TOLERANCE_UM,
+        }
+    }
+}
+
+/// Share of a requested error that leaving an effect out may cost; the rest is the level's.
+const EFFECT_SHARE: f64 = 0.2;
 
 /// A question to a prepared scene.
 #[derive(Clone, Debug, PartialEq)]

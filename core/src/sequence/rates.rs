@@ -66,7 +66,7 @@ pub(super) fn decide(prepared: &PreparedScene, sequence: &Sequence, plan: &Plan)
         let called_for = value > RATE_TOLERANCE;
         let (simulated, why) = match &sequence.effects {
             _ if !touches => (false, "the needle presses in no step".to_owned()),
-            EffectChoice::Auto => (called_for, times),
+            EffectChoice::Auto | EffectChoice::AutoWithin { .. } => (called_for, times),
             EffectChoice::All => (true, "asked for with `all`".to_owned()),
             EffectChoice::Named(names) => (names.iter().any(|n| n == name), "as listed in the request".to_owned()),
         };

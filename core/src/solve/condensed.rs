@@ -35,7 +35,7 @@ pub(super) struct Condensed {
     /// Stiffness K of what is not in the tail.
     tissue: Dense,
     /// Memory for Hessians.
-    hessian: Vec<f64>,
+    hessian: Dense,
 }
 
 impl Condensed {
@@ -47,7 +47,7 @@ impl Condensed {
 
 impl Default for Condensed {
     fn default() -> Self {
-        Condensed { whole: Dense::empty(), tissue: Dense::empty(), hessian: Vec::new() }
+        Condensed { whole: Dense::empty(), tissue: Dense::empty(), hessian: Dense::empty() }
     }
 }
 
@@ -63,11 +63,11 @@ impl System<'_> {
         if size == 0 {
             return;
         }
-        let whole = factor.tail(self.symbolic, size).times_transposed();
-        self.tail().hessian(positions, Stresses::Predicted(predicted), scratch, &mut condensed.hessian);
-        let own = |i: usize, j: usize| condensed.hessian[i.max(j) * (size + 3) + i.min(j)];
-        condensed.tissue = Dense::from_fn(size, |i, j| whole.at(i, j) - own(i, j));
-        condensed.whole = whole;
+        condensed.whole = factor.tail(self.symbolic, size, 3).times_transposed();
+        condensed.tissue = condensed.whole.clone();
+        let own = Stresses::Predicted(predicted);
+        self.tail().add_hessian(positions, own, -1.0, scratch, condensed.tissue.lower_mut());
+        condensed.tissue.clear_border();
     }
 
     /// From the Newton step `newton` (free unknowns, then the border) at `positions` the one that meets the effects on the tail as they are at its end; `None`

@@ -1,76 +1,124 @@
 //! Small dense symmetric systems (the one place that names faer's dense code; the sparse one is `sparse`). Sequential.
 
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::{factor, solve};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::linalg::solvers::Llt;
-use faer::prelude::Solve;
-use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
+use faer::{Accum, MatMut, MatRef, Par, Spec};
 
-/// A dense square matrix.
-pub(super) struct Dense(Mat<f64>);
+/// The lower triangle of a symmetric matrix, column by column, with a border of a few rows more that is carried along and not solved for.
+#[derive(Debug)]
+pub(super) struct Dense {
+    size: usize,
+    /// Rows, those of the border included.
+    stride: usize,
+    values: Vec<f64>,
+}
+
+impl Clone for Dense {
+    fn clone(&self) -> Self {
+        Dense { values: self.values.clone(), ..*self }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        (self.size, self.stride) = (source.size, source.stride);
+        self.values.clone_from(&source.values);
+    }
+}
 
 impl Dense {
-    /// With the entry (row, column) that `entry` says.
-    pub fn from_fn(size: usize, entry: impl FnMut(usize, usize) -> f64) -> Self {
-        Dense(Mat::from_fn(size, size, entry))
+    /// Zeros.
+    pub fn zeros(size: usize, border: usize) -> Self {
+        let stride = size + border;
+        Dense { size, stride, values: vec![0.0; stride * stride] }
     }
 
     /// Without rows.
     pub fn empty() -> Self {
-        Dense(Mat::new())
+        Dense::zeros(0, 0)
     }
 
-    /// Number of rows.
+    /// Number of rows that are solved for.
     pub fn size(&self) -> usize {
-        self.0.nrows()
+        self.size
     }
 
-    /// The entry in `row` and `column`.
+    /// The entry in `row` and `column` ≤ `row`, the border's after the others.
     pub fn at(&self, row: usize, column: usize) -> f64 {
-        self.0[(row, column)]
+        self.values[column * self.stride + row]
     }
 
-    /// Sets the entry in `row` and `column`.
+    /// Sets the entry in `row` and `column` ≤ `row`.
     pub fn set(&mut self, row: usize, column: usize, value: f64) {
-        self.0[(row, column)] = value;
+        self.values[column * self.stride + row] = value;
     }
 
-    /// L Lᵀ of this lower triangle L.
+    /// Every entry, column by column, the border's rows and columns after the others; those above the diagonal are not read.
+    pub fn lower_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
+    /// Leaves the border zero.
+    pub fn clear_border(&mut self) {
+        let (size, stride) = (self.size, self.stride);
+        self.values.chunks_exact_mut(stride).for_each(|column| column[size..].fill(0.0));
+    }
+
+    fn inner(&self) -> MatRef<'_, f64> {
+        let whole = MatRef::from_column_major_slice(&self.values, self.stride, self.stride);
+        whole.submatrix(0, 0, self.size, self.size)
+    }
+
+    fn inner_mut(&mut self) -> MatMut<'_, f64> {
+        let whole = MatMut::from_column_major_slice_mut(&mut self.values, self.stride, self.stride);
+        whole.submatrix_mut(0, 0, self.size, self.size)
+    }
+
+    /// L Lᵀ of this lower triangle L, its border zero.
     pub fn times_transposed(&self) -> Self {
-        let size = self.size();
-        let mut product = Mat::<f64>::zeros(size, size);
+        let mut product = Dense::zeros(self.size, self.stride - self.size);
         matmul(
-            product.as_mut(),
+            product.inner_mut(),
             BlockStructure::TriangularLower,
             Accum::Replace,
-            self.0.as_ref(),
+            self.inner(),
             BlockStructure::TriangularLower,
-            self.0.as_ref().transpose(),
+            self.inner().transpose(),
             BlockStructure::TriangularUpper,
             1.0,
             Par::Seq,
         );
-        Dense::from_fn(size, |row, column| product[(row.max(column), row.min(column))])
+        product
     }
 
-    /// Matrix times vector.
+    /// The symmetric matrix times a vector.
     pub fn times(&self, vector: &[f64]) -> Vec<f64> {
-        let product = &self.0 * MatRef::from_column_major_slice(vector, vector.len(), 1);
-        (0..vector.len()).map(|row| product[(row, 0)]).collect()
+        let mut out = vec![0.0; self.size];
+        for (column, entries) in self.values.chunks_exact(self.stride).take(self.size).enumerate() {
+            let below = &entries[column + 1..self.size];
+            let scale = vector[column];
+            let mut sum = entries[column] * scale;
+            for ((entry, out), x) in below.iter().zip(&mut out[column + 1..]).zip(&vector[column + 1..]) {
+                *out += entry * scale;
+                sum += entry * x;
+            }
+            out[column] += sum;
+        }
+        out
     }
 
-    /// The Cholesky factor of the symmetric matrix whose lower triangle this is; `None` if it is not positive definite.
-    pub fn cholesky(&self) -> Option<DenseFactor> {
-        self.0.llt(Side::Lower).ok().map(DenseFactor)
+    /// Replaces the matrix by its Cholesky factor, the border kept; whether it is positive definite.
+    pub fn factorize(&mut self) -> bool {
+        let mut memory = MemBuffer::new(factor::cholesky_in_place_scratch::<f64>(self.size, Par::Seq, Spec::default()));
+        let stack = MemStack::new(&mut memory);
+        let regularization = factor::LltRegularization::default();
+        factor::cholesky_in_place(self.inner_mut(), regularization, Par::Seq, stack, Spec::default()).is_ok()
     }
-}
 
-/// The Cholesky factor of a dense matrix.
-pub(super) struct DenseFactor(Llt<f64>);
-
-impl DenseFactor {
-    /// Solves in place for right-hand sides of `size` entries each, one after the other.
-    pub fn solve(&self, size: usize, columns: &mut [f64]) {
-        let count = columns.len() / size;
-        self.0.solve_in_place(MatMut::from_column_major_slice_mut(columns, size, count));
+    /// Solves in place with the factor that this is, for right-hand sides of `size` entries each, one after the other.
+    pub fn substitute(&self, columns: &mut [f64]) {
+        let count = columns.len() / self.size;
+        let mut memory = MemBuffer::new(solve::solve_in_place_scratch::<f64>(self.size, count, Par::Seq));
+        let columns = MatMut::from_column_major_slice_mut(columns, self.size, count);
+        solve::solve_in_place(self.inner(), columns, Par::Seq, MemStack::new(&mut memory));
     }
 }

@@ -59,7 +59,7 @@ const FIRST_SHIFT: f64 = 1e-4;
 /// Shifts tried before giving up.
 const MAX_SHIFTS: usize = 8;
 /// Residual over force scale above which predicted stresses are not used in the first steps.
-const STRESS_STIFFNESS_BELOW: f64 = 0.1;
+const STRESS_STIFFNESS_BELOW: f64 = 2.0;
 /// How many first steps these are; what is still far after them is on its way through large rotations, and short steps without stresses lead
 /// nowhere.
 const STRESSLESS_STEPS: usize = 6;
@@ -130,6 +130,7 @@ impl System<'_> {
         trial: &mut Trial,
         workspace: &mut Workspace,
     ) -> Result<usize, NewtonError> {
+        workspace.responses = None;
         if trial.globalization == Globalization::LineSearch {
             hessian(
                 self.terms,

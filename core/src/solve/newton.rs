@@ -47,9 +47,11 @@ pub struct NewtonSettings {
 }
 
 /// Residual over force scale below which chord steps are tried: the tissue hardly bends any further.
-const CHORD_BELOW: f64 = 1e-2;
-/// A chord step must bring the residual down to this share: it costs a fifth to a quarter of an iteration, of which few are left here.
-const CHORD_REDUCTION: f64 = 0.2;
+const CHORD_BELOW: f64 = 0.1;
+/// A chord step must bring the residual down to this share: what is far from linear is left to a new factor.
+const CHORD_REDUCTION: f64 = 0.5;
+/// Chord steps that may still be needed, at the rate at which the last one brought the residual down: as many cost about what an iteration does.
+const MOST_CHORDS_LEFT: f64 = 5.0;
 
 /// Residual over force scale above which a chord step is refined: below, the contact has found its points.
 const REFINED_ABOVE: f64 = 1e-3;
@@ -156,6 +158,8 @@ pub struct Workspace {
     pub(super) held: Held,
     pub(super) scratch: Scratch,
     pub(super) condensed: Condensed,
+    /// What the factor at hand answers to the coupling columns of a drive.
+    pub(super) responses: Option<(Drive, Vec<f64>)>,
 }
 
 impl Workspace {
@@ -168,6 +172,7 @@ impl Workspace {
             held: Held::default(),
             scratch: Scratch::default(),
             condensed: Condensed::default(),
+            responses: None,
         }
     }
 }
@@ -286,7 +291,7 @@ impl System<'_> {
         Ok(report)
     }
 
-    /// A step with the factor at hand, kept if it brings the residual down enough; whether it did.
+    /// A step with the factor at hand, kept if it brings the residual down enough; whether another one pays.
     fn chord(
         &self,
         positions: &mut [f64],
@@ -307,16 +312,17 @@ impl System<'_> {
         self.dofs.advance(positions, &step, 1.0);
         let residual_mn = self.residual(positions, drive, workspace);
         report.chords += 1;
+        let rate = residual_mn / report.residual_mn;
         // Not a number is not smaller either.
-        let pays = residual_mn <= CHORD_REDUCTION * report.residual_mn;
-        if pays {
+        if rate <= CHORD_REDUCTION {
             report.residual_mn = residual_mn;
-        } else {
-            positions.copy_from_slice(&before);
-            self.change_multiplier(-change);
-            report.residual_mn = self.residual(positions, drive, workspace);
+            let left = (settings.tolerance_mn / residual_mn).ln() / rate.ln();
+            return Ok(left <= MOST_CHORDS_LEFT);
         }
-        Ok(pays)
+        positions.copy_from_slice(&before);
+        self.change_multiplier(-change);
+        report.residual_mn = self.residual(positions, drive, workspace);
+        Ok(false)
     }
 
     /// The Newton step (free unknowns, the border, and the change of the multiplier where there is one), the travel limited, and the slope of the potential along it.
@@ -327,20 +333,21 @@ impl System<'_> {
         workspace: &mut Workspace,
     ) -> Result<(Vec<f64>, f64), NewtonError> {
         let free = self.dofs.free;
-        let residual = &workspace.residual;
         let directions: Vec<Vector3<f64>> = drive.directions().into_iter().map(|(direction, _)| direction).collect();
-        let out_of_balance = drive.out_of_balance(&Vector3::from_row_slice(&residual[free..]));
+        let out_of_balance = drive.out_of_balance(&Vector3::from_row_slice(&workspace.residual[free..]));
         let border = &workspace.values[self.pattern.stored()..];
-        let corner = &border[3 * free..];
-        let mut columns: Vec<f64> = residual[..free].iter().map(|r| -r).collect();
-        for direction in &directions {
-            columns.extend((0..free).map(|i| (0..3).map(|k| border[k * free + i] * direction[k]).sum::<f64>()));
-        }
-        let couplings = columns[free..].to_vec();
-        columns.extend_from_slice(&workspace.held.slope);
-        workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut columns)?;
+        let couplings: Vec<f64> = directions
+            .iter()
+            .flat_map(|direction| (0..free).map(|i| (0..3).map(|k| border[k * free + i] * direction[k]).sum::<f64>()))
+            .collect();
+        let mut columns: Vec<f64> = workspace.residual[..free].iter().map(|r| -r).collect();
         let mut changes = Vec::new();
-        if !workspace.held.slope.is_empty() {
+        if workspace.held.slope.is_empty() {
+            self.respond(drive, &couplings, &mut columns, workspace);
+        } else {
+            columns.extend_from_slice(&couplings);
+            columns.extend_from_slice(&workspace.held.slope);
+            workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut columns)?;
             let (bent, response) = columns.split_at_mut((1 + directions.len()) * free);
             let border = Border::new(&workspace.held, response);
             let missing = workspace.held.missing;
@@ -353,7 +360,16 @@ impl System<'_> {
             columns: &columns[..(1 + directions.len()) * free],
             out_of_balance: &out_of_balance,
         };
+        let corner = &workspace.values[self.pattern.stored() + 3 * free..];
         let (mut step, travels) = bordered.step(|row, column| corner[3 * row + column], max_travel_mm);
+        if changes.is_empty() {
+            let mut forces: Vec<f64> = workspace.residual[..free].iter().map(|r| -r).collect();
+            for (travel, coupling) in travels.iter().zip(couplings.chunks_exact(free)) {
+                forces.iter_mut().zip(coupling).for_each(|(force, coupling)| *force -= travel * coupling);
+            }
+            workspace.factor.check(self.symbolic, self.pattern, &workspace.values, &mut step[..free], &forces)?;
+        }
+        let residual = &workspace.residual;
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let mut slope = dot(&step[..free], &residual[..free]) + dot(&travels, &out_of_balance);
         if let [alone, with_travel @ ..] = &changes[..] {
@@ -362,6 +378,23 @@ impl System<'_> {
             step.push(change);
         }
         Ok((step, slope.min(0.0)))
+    }
+
+    /// Solves for the forces in `columns` and puts the answers to the `couplings` behind them, which the factor at hand gives once for each drive.
+    fn respond(&self, drive: Drive, couplings: &[f64], columns: &mut Vec<f64>, workspace: &mut Workspace) {
+        let forces = columns.len();
+        match workspace.responses.take_if(|(of, _)| *of == drive) {
+            Some(at_hand) => {
+                workspace.factor.substitute(self.symbolic, self.pattern, columns);
+                columns.extend_from_slice(&at_hand.1);
+                workspace.responses = Some(at_hand);
+            }
+            None => {
+                columns.extend_from_slice(couplings);
+                workspace.factor.substitute(self.symbolic, self.pattern, columns);
+                workspace.responses = Some((drive, columns[forces..].to_vec()));
+            }
+        }
     }
 
     fn bad_start(&self, positions: &[f64], scratch: &mut Scratch) -> NewtonError {

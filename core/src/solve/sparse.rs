@@ -138,7 +138,7 @@ impl Factor {
             .map_err(|_| LinearSolveError::Indefinite)
     }
 
-    /// Solves A x = b for `columns` right-hand sides laid out one after the other in `rhs`, in place, and checks each residual
+    /// Solves A x = b for right-hand sides laid out one after the other in `rhs`, in place, and checks each residual
     /// (one step of refinement where it helps).
     ///
     /// # Errors
@@ -150,37 +150,55 @@ impl Factor {
         values: &[f64],
         rhs: &mut [f64],
     ) -> Result<(), LinearSolveError> {
-        let n = pattern.free;
-        let columns = rhs.len() / n;
         let target = rhs.to_vec();
-        self.back_substitute(symbolic, rhs, n, columns);
-        for column in 0..columns {
-            let b = &target[column * n..(column + 1) * n];
-            let size = norm(b);
-            if size == 0.0 {
-                continue;
-            }
-            let mut relative = self.residual_into(pattern, values, &rhs[column * n..(column + 1) * n], b) / size;
-            if relative > REFINE_ABOVE {
-                let mut correction = std::mem::take(&mut self.residual);
-                self.back_substitute(symbolic, &mut correction, n, 1);
-                let x = &mut rhs[column * n..(column + 1) * n];
-                for (x, c) in x.iter_mut().zip(&correction) {
-                    *x += c;
-                }
-                self.residual = correction;
-                relative = self.residual_into(pattern, values, &rhs[column * n..(column + 1) * n], b) / size;
-            }
-            if relative.is_nan() || relative > MAX_RELATIVE_RESIDUAL {
-                return Err(LinearSolveError::Inaccurate { relative_residual: relative });
-            }
+        self.substitute(symbolic, pattern, rhs);
+        for (x, b) in rhs.chunks_exact_mut(pattern.free).zip(target.chunks_exact(pattern.free)) {
+            self.check(symbolic, pattern, values, x, b)?;
         }
         Ok(())
     }
 
-    /// The last `size` rows and columns of the factor L, its upper triangle zero.
-    pub(super) fn tail(&self, symbolic: &SymbolicFactor, size: usize) -> Dense {
-        let mut tail = Dense::from_fn(size, |_, _| 0.0);
+    /// As [`Factor::solve`], unchecked: what is made of the solutions is to be checked.
+    pub(super) fn substitute(&mut self, symbolic: &SymbolicFactor, pattern: &Pattern, rhs: &mut [f64]) {
+        let columns = rhs.len() / pattern.free;
+        self.back_substitute(symbolic, rhs, pattern.free, columns);
+    }
+
+    /// Checks that A x = b, with one step of refinement where it helps.
+    ///
+    /// # Errors
+    /// [`LinearSolveError::Inaccurate`].
+    pub(super) fn check(
+        &mut self,
+        symbolic: &SymbolicFactor,
+        pattern: &Pattern,
+        values: &[f64],
+        x: &mut [f64],
+        b: &[f64],
+    ) -> Result<(), LinearSolveError> {
+        let size = norm(b);
+        if size == 0.0 {
+            return Ok(());
+        }
+        let mut relative = self.residual_into(pattern, values, x, b) / size;
+        if relative > REFINE_ABOVE {
+            let mut correction = std::mem::take(&mut self.residual);
+            self.back_substitute(symbolic, &mut correction, pattern.free, 1);
+            for (x, c) in x.iter_mut().zip(&correction) {
+                *x += c;
+            }
+            self.residual = correction;
+            relative = self.residual_into(pattern, values, x, b) / size;
+        }
+        if relative.is_nan() || relative > MAX_RELATIVE_RESIDUAL {
+            return Err(LinearSolveError::Inaccurate { relative_residual: relative });
+        }
+        Ok(())
+    }
+
+    /// The last `size` rows and columns of the factor L, with a border of `border` rows of zeros.
+    pub(super) fn tail(&self, symbolic: &SymbolicFactor, size: usize, border: usize) -> Dense {
+        let mut tail = Dense::zeros(size, border);
         let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.symbolic.raw() else { return tail };
         let first = raw.nrows() - size;
         let factor = SupernodalLltRef::new(raw, &self.values);

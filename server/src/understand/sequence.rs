@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use retina_core::predict::Level;
-use retina_core::predict::budget::DEFAULT_LEVEL;
+use retina_core::predict::budget::{Budget, DEFAULT_LEVEL};
 use retina_core::sequence::{Sequence, Step};
 use serde_json::json;
 
@@ -32,7 +32,7 @@ pub fn sequence(request: &SimulateRequest, most_steps: usize) -> Result<Sequence
         needle: needle::needle(&request.needle)?,
         steps: request.steps.iter().enumerate().map(step).collect::<Result<_, _>>()?,
         level: level(request.accuracy.as_ref())?,
-        effects: effects(request.effects.as_ref())?,
+        effects: effects(request.effects.as_ref(), &Budget::default())?,
     })
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Vector3};
 use retina_core::equilibrium::{ContactSettings, Equilibrium, Load, MeshSize, Motion, Solid, Tool, Wall};
 use retina_core::mesh::disc::DiscGeometry;
-use retina_core::mesh::sample::locate;
+use retina_core::mesh::sample::SurfaceLocator;
 use retina_core::mesh::wall::{WallDivision, WallTopology};
 use retina_core::needle::NeedleShape;
 use retina_core::progress::Silent;
@@ -190,7 +190,7 @@ fn neo_hookean_slab_under_a_capsule() {
         // Worst row, by the share of what it is allowed.
         let mut worst = [0.0; 4];
         for (&[r, ur, uz, _], still) in rows.iter().zip(moved_rows) {
-            let found = locate(wall.topology(), &wall.geometry, [r, 0.0]).expect("on the mesh").interpolate(&moved);
+            let found = SurfaceLocator::new(wall.topology(), &wall.geometry).locate([r, 0.0]).expect("on the mesh").interpolate(&moved);
             let error = (found.x - ur).abs().max((found.z - uz).abs()) / depth;
             let allowed = mesh + PENALTY + still[3].abs() / moved_depth;
             if error / allowed > worst[0] {

@@ -1,7 +1,6 @@
 //! When the fluid under the retina matters: when it lifts the surface, which it does by itself, needle or not.
 
 use super::super::types::{EffectChoice, EffectReport, Level};
-use super::AUTO_TOLERANCE_UM;
 use super::criterion::Criterion;
 use crate::effects::bleb;
 
@@ -17,7 +16,7 @@ pub fn report(choice: &EffectChoice, level: Level, rise_um: Option<f64>) -> Effe
     Criterion {
         name: bleb::NAME,
         value: rise_um.unwrap_or(0.0),
-        threshold: AUTO_TOLERANCE_UM,
+        threshold: choice.tolerance_um(),
         quantity: "the expected rise of the surface over the fluid [µm]",
         ruled_out,
     }

@@ -21,7 +21,7 @@ impl Criterion<'_> {
     pub fn settle(self, choice: &EffectChoice) -> EffectReport {
         let called_for = self.value > self.threshold;
         let wanted = match choice {
-            EffectChoice::Auto => called_for,
+            EffectChoice::Auto | EffectChoice::AutoWithin { .. } => called_for,
             EffectChoice::All => true,
             EffectChoice::Named(names) => names.iter().any(|name| name == self.name),
         };
@@ -29,8 +29,8 @@ impl Criterion<'_> {
             (Some(reason), _) => reason.to_owned(),
             (None, EffectChoice::All) => "asked for with `all`".to_owned(),
             (None, EffectChoice::Named(_)) => "as listed in the request".to_owned(),
-            (None, EffectChoice::Auto) if called_for => format!("{} exceeds what may be neglected", self.quantity),
-            (None, EffectChoice::Auto) => format!("{} may be neglected", self.quantity),
+            (None, _) if called_for => format!("{} exceeds what may be neglected", self.quantity),
+            (None, _) => format!("{} may be neglected", self.quantity),
         };
         EffectReport {
             name: self.name,

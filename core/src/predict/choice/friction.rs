@@ -7,7 +7,6 @@
 //! In a sequence the pressed needle also moves along the surface from step to step, and drags it as far, with no more than µ × depth again.
 
 use super::super::types::{EffectChoice, EffectReport, Level};
-use super::AUTO_TOLERANCE_UM;
 use super::criterion::Criterion;
 use crate::effects::friction;
 
@@ -52,7 +51,7 @@ pub fn report(choice: &EffectChoice, level: Level, contact: bool, sliding: &Slid
     Criterion {
         name: friction::NAME,
         value: sliding.dragged_um(),
-        threshold: AUTO_TOLERANCE_UM,
+        threshold: choice.tolerance_um(),
         quantity: "what friction may drag the surface along [µm]",
         ruled_out,
     }

@@ -1,7 +1,6 @@
 //! When the eye's pressure matters: it does when it moves the surface, which it does by itself, needle or not.
 
 use super::super::types::{EffectChoice, EffectReport};
-use super::AUTO_TOLERANCE_UM;
 use super::criterion::Criterion;
 use crate::effects::pressure;
 
@@ -12,7 +11,7 @@ pub fn report(choice: &EffectChoice, change_kpa: f64, sink_um: f64) -> EffectRep
     Criterion {
         name: pressure::NAME,
         value: sink_um.abs(),
-        threshold: AUTO_TOLERANCE_UM,
+        threshold: choice.tolerance_um(),
         quantity: "the sinking of the surface under the change of pressure [µm]",
         ruled_out,
     }

@@ -4,7 +4,6 @@
 //! bends it by that over its stiffness. The tip takes the surface along at most as far.
 
 use super::super::types::{EffectChoice, EffectReport, Level};
-use super::AUTO_TOLERANCE_UM;
 use super::criterion::Criterion;
 use crate::effects::tool_flex::{LEAST_COSINE, NAME};
 
@@ -46,7 +45,7 @@ pub fn report(choice: &EffectChoice, level: Level, contact: bool, bending: &Bend
     Criterion {
         name: NAME,
         value: bending.deflection_um(),
-        threshold: AUTO_TOLERANCE_UM,
+        threshold: choice.tolerance_um(),
         quantity: "the deflection of the tip under the expected force across the shaft [µm]",
         ruled_out,
     }

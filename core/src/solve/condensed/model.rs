@@ -49,7 +49,7 @@ impl Model<'_> {
         &self,
         start: &[f64],
         max_travel_mm: f64,
-        hessian: &mut Vec<f64>,
+        hessian: &mut Dense,
         workspace: &mut Workspace,
     ) -> Option<Vec<f64>> {
         let newton = self.state(start.to_vec(), workspace);
@@ -70,38 +70,31 @@ impl Model<'_> {
     }
 
     /// Newton's step from `at`; `None` if there is none.
-    fn step(
-        &self,
-        at: &State,
-        max_travel_mm: f64,
-        hessian: &mut Vec<f64>,
-        workspace: &mut Workspace,
-    ) -> Option<Vec<f64>> {
+    fn step(&self, at: &State, max_travel_mm: f64, hessian: &mut Dense, workspace: &mut Workspace) -> Option<Vec<f64>> {
         let size = self.force.len();
-        let stride = size + 3;
         let positions = self.positions(&at.unknowns);
         // Stresses far above those in balance turn the Hessian over; without them it is as definite as the tissue.
-        let factor = [Stresses::Current, Stresses::None].into_iter().find_map(|stresses| {
-            self.tail.hessian(&positions, stresses, &mut workspace.scratch, hessian);
-            let entry = |i: usize, j: usize| if i >= j { self.tissue.at(i, j) + hessian[i * stride + j] } else { 0.0 };
-            Dense::from_fn(size, entry).cholesky()
+        [Stresses::Current, Stresses::None].into_iter().find(|stresses| {
+            hessian.clone_from(self.tissue);
+            self.tail.add_hessian(&positions, *stresses, 1.0, &mut workspace.scratch, hessian.lower_mut());
+            hessian.factorize()
         })?;
         let directions: Vec<Vector3<f64>> =
             self.drive.directions().into_iter().map(|(direction, _)| direction).collect();
         let mut columns: Vec<f64> = at.residual.iter().map(|r| -r).collect();
         for direction in &directions {
-            let coupled = |i: usize| (0..3).map(|k| hessian[(size + k) * stride + i] * direction[k]).sum::<f64>();
+            let coupled = |i: usize| (0..3).map(|k| hessian.at(size + k, i) * direction[k]).sum::<f64>();
             columns.extend((0..size).map(coupled));
         }
         let couplings = columns[size..].to_vec();
-        factor.solve(size, &mut columns);
+        hessian.substitute(&mut columns);
         let bordered = Bordered {
             directions: &directions,
             couplings: &couplings,
             columns: &columns,
             out_of_balance: &at.out_of_balance,
         };
-        let corner = |row: usize, column: usize| hessian[(size + row) * stride + size + column];
+        let corner = |row: usize, column: usize| hessian.at(size + row, size + column);
         let (step, _) = bordered.step(corner, max_travel_mm);
         Some(step)
     }

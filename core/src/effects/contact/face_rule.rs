@@ -1,0 +1,102 @@
+//! Quadrature on a face that has the needle for one more vertex, and the sums of products of weights that Hessians on it are made of.
+//!
+//! A point's offset from the needle is Σ wₐ xₐ with the face's shape functions as weights and −1 for the needle, so an energy of it has the Hessian
+//! Σ wₐ w_b S with S the 3 × 3 second derivative at the point. The products wₐ w_b are those of the reference face: they are made once for each number of points.
+//! Not here: which energy.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use nalgebra::Matrix3;
+
+use crate::mesh::element::{FACE_NODES, TOP_NODES, gauss_rule, shapes};
+
+/// Vertices of a group: those of the face, then the needle.
+pub const GROUP: usize = FACE_NODES + 1;
+
+/// Products of two weights, the second vertex not after the first, padded to whole vectors of four.
+const PAIRS: usize = (GROUP * (GROUP + 1) / 2).next_multiple_of(4);
+
+/// Component pairs (row, column) of the lower block triangle.
+const BLOCKS: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+
+/// Shape functions at the quadrature points of the reference face.
+#[derive(Debug)]
+pub(super) struct FaceRule {
+    /// Values of the face's shape functions and −1, for each point.
+    pub weights: Vec<[f64; GROUP]>,
+    /// Quadrature weight of each point, and the slopes of the shape functions there.
+    pub slopes: Vec<(f64, [[f64; 2]; FACE_NODES])>,
+    pairs: Vec<[f64; PAIRS]>,
+}
+
+/// The rules made so far, by points per edge.
+static RULES: Mutex<BTreeMap<usize, Arc<FaceRule>>> = Mutex::new(BTreeMap::new());
+
+impl FaceRule {
+    /// The rule with `points_per_edge` Gauss points in each direction.
+    pub fn shared(points_per_edge: usize) -> Arc<FaceRule> {
+        let mut rules = RULES.lock().unwrap_or_else(PoisonError::into_inner);
+        rules.entry(points_per_edge).or_insert_with(|| Arc::new(FaceRule::new(points_per_edge))).clone()
+    }
+
+    fn new(points_per_edge: usize) -> Self {
+        let rule = gauss_rule(points_per_edge);
+        let mut out = FaceRule { weights: Vec::new(), slopes: Vec::new(), pairs: Vec::new() };
+        for &(eta, w_eta) in &rule {
+            for &(xi, w_xi) in &rule {
+                let shape = shapes([xi, eta, 1.0]);
+                let mut weights = [-1.0; GROUP];
+                for (weight, &node) in weights.iter_mut().zip(TOP_NODES.iter()) {
+                    *weight = shape[node].value;
+                }
+                let mut pairs = [0.0; PAIRS];
+                let products = (0..GROUP).flat_map(|a| (0..=a).map(move |b| weights[a] * weights[b]));
+                pairs.iter_mut().zip(products).for_each(|(pair, product)| *pair = product);
+                out.weights.push(weights);
+                out.slopes
+                    .push((w_xi * w_eta, TOP_NODES.map(|node| [shape[node].gradient[0], shape[node].gradient[1]])));
+                out.pairs.push(pairs);
+            }
+        }
+        out
+    }
+}
+
+/// The Hessian of one face, summed over its points.
+pub struct FaceStiffness<'a> {
+    rule: &'a FaceRule,
+    sums: [[f64; PAIRS]; BLOCKS.len()],
+}
+
+impl<'a> FaceStiffness<'a> {
+    pub(super) fn new(rule: &'a FaceRule) -> Self {
+        FaceStiffness { rule, sums: [[0.0; PAIRS]; BLOCKS.len()] }
+    }
+
+    /// Adds a point whose energy has the symmetric second derivative `stiffness` (mN/mm) by its offset from the needle.
+    pub fn add(&mut self, point: usize, stiffness: &Matrix3<f64>) {
+        let pairs = &self.rule.pairs[point];
+        for (sums, &(i, j)) in self.sums.iter_mut().zip(&BLOCKS) {
+            let scale = stiffness[(i, j)];
+            for (sum, pair) in sums.iter_mut().zip(pairs) {
+                *sum += scale * pair;
+            }
+        }
+    }
+
+    /// Adds the sum to the lower triangle of the group's matrix `out`.
+    pub fn add_to(&self, out: &mut [f64]) {
+        for (sums, &(i, j)) in self.sums.iter().zip(&BLOCKS) {
+            let mut pairs = sums.iter();
+            for a in 0..GROUP {
+                for (b, pair) in (0..=a).zip(&mut pairs) {
+                    out[(i * GROUP + a) * 3 * GROUP + j * GROUP + b] += pair;
+                    if i != j && a != b {
+                        out[(i * GROUP + b) * 3 * GROUP + j * GROUP + a] += pair;
+                    }
+                }
+            }
+        }
+    }
+}

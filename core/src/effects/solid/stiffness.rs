@@ -1,0 +1,132 @@
+//! The element matrix of a solid: sums of outer products over quadrature points and pressure modes.
+//!
+//! The matrix has a block for each pair of components; each block is one sum (`products`). Not here: the coefficients, which are the material's.
+
+use nalgebra::Matrix4;
+
+use super::SolidGeometry;
+use super::products::{add_products, add_symmetric_products, scaled_row};
+use crate::mesh::element::{MODES, NODES, POINTS};
+
+/// One number per node for each component at each quadrature point: indexed (component, point, node).
+pub type PointRows = [[[f64; NODES]; POINTS]; 3];
+
+/// Component pairs (row, column) of the lower block triangle of an element matrix.
+const BLOCKS: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+
+/// The second derivative of an energy of the projected dilatation.
+pub struct Volumetric {
+    /// ∂J/∂x at each point (1/mm).
+    pub dilatation_gradient: PointRows,
+    /// Quadrature weight times U″(θ) at each point (mN·mm).
+    pub stiffness: [f64; POINTS],
+}
+
+/// Coefficients of the point-wise stiffness, quadrature weight included (mN·mm).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StiffnessCoefficients {
+    /// Multiplies δᵢⱼ Gₐ·G_b.
+    pub rest: f64,
+    /// Multiplies gₐⱼ g_bᵢ.
+    pub cross: f64,
+    /// Multiplies gₐᵢ g_bⱼ.
+    pub outer: f64,
+}
+
+impl SolidGeometry {
+    /// Adds the element matrix (lower triangle): its point-wise part for the given coefficients, quadrature weight included, and, of an energy of the projected
+    /// dilatation θ, the part Σ_q w U″(θ_q) ∇θ_q ⊗ ∇θ_q.
+    ///
+    /// Each block of it (component i by component j) is one sum of outer products of rows of numbers per node.
+    #[inline(always)]
+    pub fn add_stiffness(
+        &self,
+        element: usize,
+        spatial: &PointRows,
+        coefficients: &[StiffnessCoefficients; POINTS],
+        volumetric: Option<&Volumetric>,
+        out: &mut [f64],
+    ) {
+        let mut isotropic = [[0.0; NODES]; NODES];
+        if coefficients.iter().any(|c| c.rest != 0.0) {
+            let rest = self.gradients[element * POINTS..(element + 1) * POINTS].as_flattened();
+            let mut scaled = [[0.0; NODES]; 3 * POINTS];
+            for (row, (scaled, rest)) in scaled.iter_mut().zip(rest).enumerate() {
+                *scaled = scaled_row(coefficients[row / 3].rest, rest);
+            }
+            add_symmetric_products([(&scaled, rest)], &mut isotropic);
+        }
+        let scaled_by = |coefficient: fn(&StiffnessCoefficients) -> f64| {
+            let mut out = [[[0.0; NODES]; POINTS]; 3];
+            for k in 0..3 {
+                for q in 0..POINTS {
+                    out[k][q] = scaled_row(coefficient(&coefficients[q]), &spatial[k][q]);
+                }
+            }
+            out
+        };
+        let has_outer = coefficients.iter().any(|c| c.outer != 0.0);
+        let cross = scaled_by(|c| c.cross);
+        let (both, outer) =
+            if has_outer { (scaled_by(|c| c.cross + c.outer), scaled_by(|c| c.outer)) } else { (cross, cross) };
+        let [scaled, integrals] = match volumetric {
+            Some(volumetric) => self.dilatation_modes(element, volumetric),
+            None => [[[[0.0; NODES]; MODES]; 3]; 2],
+        };
+        let modes = if volumetric.is_some() { MODES } else { 0 };
+        let outers = if has_outer { POINTS } else { 0 };
+        let rows = out.as_chunks_mut::<NODES>().0;
+        for &(i, j) in &BLOCKS {
+            let of_modes = (&scaled[i][..modes], &integrals[j][..modes]);
+            let mut block = [[0.0; NODES]; NODES];
+            if i == j {
+                block = isotropic;
+                add_symmetric_products([(&both[i], &spatial[i]), of_modes], &mut block);
+            } else {
+                let of_outer = (&outer[i][..outers], &spatial[j][..outers]);
+                add_products([(&cross[j], &spatial[i]), of_outer, of_modes], &mut block);
+            }
+            for (a, block) in block.iter().enumerate() {
+                let row = &mut rows[(i * NODES + a) * 3 + j];
+                for b in 0..NODES {
+                    row[b] += block[b];
+                }
+            }
+        }
+    }
+
+    /// The gradients of the dilatation's pressure modes (component, mode), M⁻¹ C M⁻¹ times them and as they are: the volumetric stiffness is the sum of their outer
+    /// products, with C the stiffness w U″ between modes.
+    #[inline(always)]
+    fn dilatation_modes(&self, element: usize, volumetric: &Volumetric) -> [[[[f64; NODES]; MODES]; 3]; 2] {
+        let mut core = Matrix4::zeros();
+        for (stiffness, modes) in volumetric.stiffness.iter().zip(&self.mode_values) {
+            for m in 0..MODES {
+                for l in 0..MODES {
+                    core[(m, l)] += stiffness * modes[m] * modes[l];
+                }
+            }
+        }
+        let core = self.mode_inverse[element] * core * self.mode_inverse[element];
+        let (mut integrals, mut scaled) = ([[[0.0; NODES]; MODES]; 3], [[[0.0; NODES]; MODES]; 3]);
+        for k in 0..3 {
+            for (q, weight) in self.weights(element).iter().enumerate() {
+                let gradient = &volumetric.dilatation_gradient[k][q];
+                for m in 0..MODES {
+                    let scale = weight * self.mode_values[q][m];
+                    for a in 0..NODES {
+                        integrals[k][m][a] = scale.mul_add(gradient[a], integrals[k][m][a]);
+                    }
+                }
+            }
+            for m in 0..MODES {
+                for l in 0..MODES {
+                    for a in 0..NODES {
+                        scaled[k][m][a] = core[(m, l)].mul_add(integrals[k][l][a], scaled[k][m][a]);
+                    }
+                }
+            }
+        }
+        [scaled, integrals]
+    }
+}
