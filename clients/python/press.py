@@ -38,3 +38,10 @@ with service.stream({"needle": {"gauge": "27G"}, "accuracy": {"level": "linear"}
         stream.ask([9.0, 0.0, 0.0], [0.0, 0.0, -0.2])
     except Problem as problem:
         print("refused:", problem.document["errors"][0]["field"])
+
+rehearsal: list[StepSpec] = [{"time_s": 0.2, "tip_mm": [0.0, 0.0, -0.06]}]
+with service.stream({"needle": {"gauge": "27G"}, "memory": {"rehearsal": rehearsal}}) as stream:
+    stream.ask([0.0, 0.0, -0.06], time_s=0.2)
+    for time_s in (1.2, 10.0):
+        surface = stream.ask(None, time_s=time_s)
+        print(f"held until {surface.time_s:.1f} s: {surface.reaction_mn[2]:.3f} mN")

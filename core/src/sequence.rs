@@ -1,5 +1,8 @@
 //! A sequence: a timed list of needle poses and forces in, one surface after another out.
 //!
+//! A [`Simulation`] is planned from a sequence. Either it computes the sequence's own steps ([`Simulation::step`]), or it takes the sequence for a rehearsal and its steps come
+//! one by one, the next unknown ([`Simulation::advance_to`]); both are the same steps to the same bits, and one that fails leaves everything as the last good one left it.
+//!
 //! Time runs from 0, when the tissue is at rest under the pressure of its eye; the load of a step is reached at the step's time, linearly from the step before. Without
 //! memory every step is an equilibrium of its own, and the step before is only its start. Memory is of two kinds, and [`Simulation`] carries both from
 //! step to step: of time (`viscoelasticity`, `inertia`), and of the way, however slowly it is gone (`friction`: where the needle holds the tissue; `adhesion`:
@@ -13,7 +16,7 @@
 //! warning that says by how much.
 //!
 //! Read on in `plan` (every step checked before the first is computed), `rates` (which effects of time are called for), `history` and `bond` (what is
-//! remembered), `advance` (one step), `cut` (a step in parts). Not here: clocks, threads, the wire.
+//! remembered), `advance` (one step), `worst` (what a step calls for), `cut` (a step in parts). Not here: clocks, threads, the wire.
 
 mod advance;
 mod bond;
@@ -21,6 +24,7 @@ mod cut;
 mod history;
 mod plan;
 mod rates;
+mod worst;
 
 use std::sync::Arc;
 
@@ -30,16 +34,18 @@ use thiserror::Error;
 use crate::equilibrium::MeshSize;
 use crate::mesh::wall::WallTopology;
 use crate::needle::{Body, Needle};
+use crate::patch::Patch;
 use crate::predict::choice::Decision;
 use crate::predict::finite_element::{COARSE, ContactEstimate, REFERENCE, Resolution};
 use crate::predict::topologies::shared_topology;
-use crate::predict::{self, CutOrGrid, EffectChoice, EffectReport, Level, PredictError, Prediction, PreparedScene};
+use crate::predict::{self, EffectChoice, EffectReport, Level, PredictError, Prediction, PreparedScene};
 use crate::progress::Progress;
 use crate::range::ParameterRange;
 use crate::solve::newton;
 use history::History;
 use plan::Plan;
 use rates::Rates;
+use worst::Worst;
 
 /// Time between two steps.
 pub const TIME_STEP: ParameterRange = ParameterRange {
@@ -106,7 +112,7 @@ pub enum SequenceError {
         /// The level asked for.
         level: &'static str,
     },
-    /// A step has no answer.
+    /// A step cannot be, or has no answer.
     #[error("steps[{step}] at {time_s} s: {cause}")]
     At {
         /// Index of the step.
@@ -118,10 +124,38 @@ pub enum SequenceError {
     },
 }
 
+/// Why a step has no answer. Nothing has changed.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum StepError {
+    /// It lies too close to the step before, too far from it or before it.
+    #[error("time_s is {step_s} s after what comes before; {min_s} to {max_s} s are allowed")]
+    Time {
+        /// Time since the step before, or since 0 (s).
+        step_s: f64,
+        /// Least allowed (s).
+        min_s: f64,
+        /// Most allowed (s).
+        max_s: f64,
+    },
+    /// It cannot be, or no equilibrium was found.
+    #[error(transparent)]
+    Predict(#[from] PredictError),
+}
+
+impl StepError {
+    /// The error of the step at `time_s`, the sequence's `step`-th.
+    fn of(self, step: usize, time_s: f64) -> SequenceError {
+        match self {
+            StepError::Time { step_s, min_s, max_s } => SequenceError::Time { step, step_s, min_s, max_s },
+            StepError::Predict(cause) => SequenceError::At { step, time_s, cause },
+        }
+    }
+}
+
 /// The answer of one step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepOutcome {
-    /// Index of the step.
+    /// Number of the step among those answered, from 0.
     pub step: usize,
     /// Its time (s).
     pub time_s: f64,
@@ -151,20 +185,9 @@ struct Settled {
     pressed: bool,
 }
 
-/// A sequence under way: what is kept between its steps.
-pub struct Simulation<'a> {
-    prepared: &'a PreparedScene,
-    sequence: &'a Sequence,
-    body: Body,
-    patch: CutOrGrid<'a>,
-    plan: Plan,
-    decision: Decision,
-    rates: Rates,
-    resolution: &'a Resolution,
-    topology: Arc<WallTopology>,
-    solver: newton::Workspace,
-    coarse: predict::Workspace,
-    next: usize,
+/// What is kept from step to step.
+#[derive(Clone, Debug)]
+struct State {
     time_s: f64,
     needle: Needle,
     /// Force of the tissue on it at the end of the last part of a step, scene coordinates (mN).
@@ -172,18 +195,38 @@ pub struct Simulation<'a> {
     laid: Option<Laid>,
     settled: Option<Settled>,
     history: Option<History>,
-    /// The first step whose tissue was punctured, and its time (s).
-    punctured: Option<(usize, f64)>,
+    /// The time of the first step whose tissue was punctured (s).
+    punctured_s: Option<f64>,
+    /// What decides about the effects, of the steps so far.
+    met: Worst,
 }
 
-impl<'a> Simulation<'a> {
+/// A needle's motion under way, planned from a sequence.
+pub struct Simulation {
+    prepared: Arc<PreparedScene>,
+    sequence: Sequence,
+    body: Body,
+    patch: Patch,
+    plan: Plan,
+    decision: Decision,
+    rates: Rates,
+    resolution: Resolution,
+    topology: Arc<WallTopology>,
+    solver: newton::Workspace,
+    coarse: predict::Workspace,
+    /// Steps answered.
+    answered: usize,
+    state: State,
+}
+
+impl Simulation {
     /// Checks every step by linear elasticity and decides which effects the sequence calls for. Nothing is simulated yet.
     ///
     /// # Errors
     /// [`SequenceError`], naming the step at fault.
     pub fn new(
-        prepared: &'a PreparedScene,
-        sequence: &'a Sequence,
+        prepared: &Arc<PreparedScene>,
+        sequence: &Sequence,
         progress: &mut dyn Progress,
     ) -> Result<Self, SequenceError> {
         Self::at(prepared, sequence, None, progress)
@@ -194,9 +237,9 @@ impl<'a> Simulation<'a> {
     /// # Errors
     /// [`SequenceError`], naming the step at fault.
     pub fn at(
-        prepared: &'a PreparedScene,
-        sequence: &'a Sequence,
-        resolution: Option<&'a Resolution>,
+        prepared: &Arc<PreparedScene>,
+        sequence: &Sequence,
+        resolution: Option<&Resolution>,
         progress: &mut dyn Progress,
     ) -> Result<Self, SequenceError> {
         if sequence.level == Level::Linear || sequence.level.is_learned() {
@@ -207,40 +250,47 @@ impl<'a> Simulation<'a> {
         let (patch, plan) = plan::plan(prepared, sequence, &body, progress)?;
         let first = |cause| SequenceError::At { step: 0, time_s: sequence.steps[0].time_s, cause };
         let (decision, rates) = rates::decide(prepared, sequence, &plan);
-        let resolution = resolution.unwrap_or(match sequence.level {
+        let resolution = *resolution.unwrap_or(match sequence.level {
             Level::Reference => &REFERENCE,
-            _ if rates.any() || (decision.is_path_dependent() && !plan.is_one_contact()) => &LASTING,
+            _ if rates.any() || (decision.is_path_dependent() && !plan.is_one_contact) => &LASTING,
             _ => &COARSE,
         });
         let topology = shared_topology(resolution.division(&prepared.scene().tissue, decision.adhesion))
             .map_err(|error| first(PredictError::Mesh(error)))?;
-        let solver = newton::Workspace::new(&topology.pattern, &topology.symbolic);
         Ok(Simulation {
-            prepared,
-            sequence,
+            prepared: Arc::clone(prepared),
+            sequence: sequence.clone(),
             body,
             patch,
-            plan,
             decision,
             rates,
             resolution,
+            solver: newton::Workspace::new(&topology.pattern, &topology.symbolic),
             topology,
-            solver,
             coarse: predict::Workspace::default(),
-            next: 0,
-            time_s: 0.0,
-            needle: sequence.needle,
-            reaction_mn: Vector3::zeros(),
-            laid: None,
-            settled: None,
-            history: None,
-            punctured: None,
+            answered: 0,
+            state: State {
+                time_s: 0.0,
+                needle: sequence.needle,
+                reaction_mn: Vector3::zeros(),
+                laid: None,
+                settled: None,
+                history: None,
+                punctured_s: None,
+                met: plan.unpressed,
+            },
+            plan,
         })
     }
 
     /// Every effect, simulated or not, and why; the same for all steps.
     pub fn effects(&self) -> &[EffectReport] {
         &self.decision.reports
+    }
+
+    /// Whether the needle presses in some step of the plan. Where it does not, nothing is known of what pressing would call for.
+    pub fn presses(&self) -> bool {
+        self.plan.around.is_some()
     }
 
     /// Whether a step depends on those before it: its mesh then lasts.
@@ -250,19 +300,48 @@ impl<'a> Simulation<'a> {
 
     /// Triangles between the nodes of every step's surface, counter-clockwise seen from the vitreous.
     pub fn triangles(&self) -> &[[usize; 3]] {
-        &self.patch.patch().triangles
+        &self.patch.triangles
     }
 
-    /// Computes the next step; `None` after the last. After an error the steps that follow have nothing to start from.
+    /// The time of the last step answered; 0 before the first (s).
+    pub fn time_s(&self) -> f64 {
+        self.state.time_s
+    }
+
+    /// Computes the next of the sequence's own steps; `None` after the last.
     ///
     /// # Errors
-    /// [`SequenceError::At`].
+    /// [`SequenceError`] of that step, which is the next again.
     pub fn step(&mut self, progress: &mut dyn Progress) -> Result<Option<StepOutcome>, SequenceError> {
-        let Some(step) = self.sequence.steps.get(self.next) else { return Ok(None) };
-        let (index, time_s) = (self.next, step.time_s);
-        let outcome = self.advance(step, progress);
-        let (prediction, mesh_laid) = outcome.map_err(|cause| SequenceError::At { step: index, time_s, cause })?;
-        self.next += 1;
-        Ok(Some(StepOutcome { step: index, time_s, mesh_laid, prediction }))
+        let Some(&step) = self.sequence.steps.get(self.answered) else { return Ok(None) };
+        self.advance_to(&step, progress).map(Some).map_err(|error| error.of(self.answered, step.time_s))
     }
+
+    /// Computes `step`, whatever the sequence says. It goes on from the last that was answered, and what it leaves out stays as that left it.
+    ///
+    /// # Errors
+    /// [`StepError`]; nothing has changed then, so another step may take its place.
+    pub fn advance_to(&mut self, step: &Step, progress: &mut dyn Progress) -> Result<StepOutcome, StepError> {
+        check_time(self.state.time_s, step.time_s)?;
+        let before = self.state.clone();
+        match self.advance(step, progress) {
+            Ok((prediction, mesh_laid)) => {
+                self.answered += 1;
+                Ok(StepOutcome { step: self.answered - 1, time_s: step.time_s, mesh_laid, prediction })
+            }
+            Err(cause) => {
+                self.state = before;
+                Err(cause.into())
+            }
+        }
+    }
+}
+
+/// Whether a step at `time_s` may follow what was at `before_s` (s).
+fn check_time(before_s: f64, time_s: f64) -> Result<(), StepError> {
+    let step_s = time_s - before_s;
+    // Times a bound apart differ by a little less or more once they are written with a finite number of digits.
+    let rounding_s = f64::EPSILON * time_s.abs();
+    let widened = ParameterRange { min: TIME_STEP.min - rounding_s, max: TIME_STEP.max + rounding_s, ..TIME_STEP };
+    widened.check("", step_s).map_err(|_| StepError::Time { step_s, min_s: TIME_STEP.min, max_s: TIME_STEP.max })
 }

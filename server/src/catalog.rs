@@ -115,6 +115,7 @@ pub fn about(config: &Config) -> About {
             simulation_steps: config.simulation_steps.into(),
             batch_poses: config.batch_poses.into(),
             streams: config.streams.into(),
+            stream_memories: config.stream_memories.into(),
             stream_idle_ms: millis(config.stream_idle()),
             stream_message_bytes: LONGEST_MESSAGE,
             body_bytes: LIMIT_BYTES,

@@ -17,7 +17,7 @@ use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::{Histogram, exponential_buckets};
 use prometheus_client::registry::{Registry, Unit};
-use retina_core::predict::{Prediction, PreparedScene, Request as Question};
+use retina_core::predict::{Level, Prediction, PreparedScene, Request as Question};
 
 use crate::audit::Audit;
 use crate::audit::metrics::AuditMetrics;
@@ -120,11 +120,16 @@ impl Metrics {
         prediction: &Prediction,
         stages: &[(&'static str, Duration)],
     ) {
-        for (stage, time) in stages {
-            self.stages.get_or_create(&Stage { level: question.level.name(), stage }).observe(time.as_secs_f64());
-        }
+        self.computed(question.level, stages);
         if let Some(audit) = self.audit.get() {
             audit.offer(scene, question, prediction);
+        }
+    }
+
+    /// A level computed in these stages.
+    pub fn computed(&self, level: Level, stages: &[(&'static str, Duration)]) {
+        for (stage, time) in stages {
+            self.stages.get_or_create(&Stage { level: level.name(), stage }).observe(time.as_secs_f64());
         }
     }
 

@@ -18,7 +18,7 @@ use utoipa::ToSchema;
 pub use kind::Kind;
 pub use predict::{from_out_of_range, from_predict};
 pub use sequence::from_sequence;
-pub use stream::of_pose;
+pub use stream::{of_pose, of_rehearsal, of_step};
 
 /// Media type of a problem document.
 pub const MEDIA_TYPE: &str = "application/problem+json";

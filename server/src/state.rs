@@ -25,6 +25,7 @@ use crate::problem::{Kind, Problem};
 use crate::recording::Recorder;
 use crate::scenes::Scenes;
 use crate::simulate;
+use crate::stream::Memories;
 use crate::times::Times;
 use crate::warm_up::prepare_built_in;
 use crate::wire::About;
@@ -68,6 +69,7 @@ pub(crate) struct ConnectionLimits {
 /// What the streams share.
 pub(crate) struct Streams {
     pub(crate) places: Arc<Semaphore>,
+    pub(crate) memories: Memories,
     /// How long a client may be silent.
     pub(crate) idle: Duration,
     pub(crate) open: TaskTracker,
@@ -155,6 +157,7 @@ impl App {
             },
             streams: Streams {
                 places: Arc::new(Semaphore::new(config.streams.into())),
+                memories: Memories::new(config.stream_memories.into(), config.simulation_steps.into()),
                 idle: config.stream_idle(),
                 open: TaskTracker::new(),
                 stopping: CancellationToken::new(),

@@ -18,7 +18,7 @@ use serde_json::json;
 
 pub use scene::{built_in, chosen, scene, scene_on_file};
 pub use sequence::sequence;
-pub use stream::{Opening, opening, pose};
+pub use stream::{Opening, REHEARSAL, opening, pose, step};
 
 use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::batch::BatchPose;

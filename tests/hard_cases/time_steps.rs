@@ -1,6 +1,8 @@
 //! Sequences with steps from a microsecond to a quarter of an hour, with everything that remembers: every step sound, and what lasts is what a single
 //! prediction says.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::{Control, EffectChoice, Level, PreparedScene, Request, Workspace};
@@ -45,7 +47,7 @@ fn steps(step_s: f64) -> Vec<Step> {
 
 /// Runs the steps; every answer sound. Its largest displacement (µm) and iterations, step by step.
 fn run(name: &str, steps: &[Step]) -> Vec<(f64, usize)> {
-    let scene = PreparedScene::new(built_in("macula")).unwrap();
+    let scene = Arc::new(PreparedScene::new(built_in("macula")).unwrap());
     let names = ["finite_strain", "contact", "viscoelasticity", "inertia"].map(str::to_owned).to_vec();
     let effects = EffectChoice::Named(names);
     let sequence = Sequence { needle: needle(), steps: steps.to_vec(), level: Level::Coarse, effects };
@@ -83,7 +85,7 @@ fn steps_of_any_length_are_sound() {
 
 #[test]
 fn the_longest_steps_forget_and_the_shortest_hardly_move_the_tissue() {
-    let scene = PreparedScene::new(built_in("macula")).unwrap();
+    let scene = Arc::new(PreparedScene::new(built_in("macula")).unwrap());
     let push = push(NeedleShape::hemispherical(0.257), FORCE_MN);
     let lasting = scene.predict(&push, &mut Workspace::default(), &mut Silent).unwrap();
     let lasting_um = lasting.displacement_um.iter().copied().fold(0.0, f64::max);
@@ -110,7 +112,7 @@ fn steps_that_change_their_length_by_nine_decades_are_sound() {
 
 #[test]
 fn steps_out_of_order_or_range_are_refused_by_name() {
-    let scene = PreparedScene::new(built_in("macula")).unwrap();
+    let scene = Arc::new(PreparedScene::new(built_in("macula")).unwrap());
     for (times, step) in [
         (&[1e-7][..], 0),
         (&[2e3], 0),

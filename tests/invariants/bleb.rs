@@ -1,5 +1,7 @@
 //! A bleb on whole scenes: its volume is kept, with and without a needle, at every pose; where there is none there is no trace of it.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use retina_core::equilibrium::bleb::VOLUME_TOLERANCE;
 use retina_core::predict::{
@@ -184,7 +186,7 @@ fn what_a_bleb_cannot_be_is_refused() {
     let names = ["elasticity", "contact"].map(str::to_owned).to_vec();
     assert!(ask(&wet, &Request { effects: EffectChoice::Named(names), ..straight(Level::Coarse, 0.2) }).is_ok());
     // A sequence says that it has none, and refuses to be asked for one.
-    let wet = filled("flat", fluid(VOLUME_MM3, 0.0, 0.0));
+    let wet = Arc::new(filled("flat", fluid(VOLUME_MM3, 0.0, 0.0)));
     let step = Step { time_s: 1.0, force_mn: Some(Vector3::new(0.0, 0.0, -0.2)), ..Step::default() };
     let mut sequence = Sequence {
         needle: straight(Level::Coarse, 0.2).needle,

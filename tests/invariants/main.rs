@@ -12,6 +12,7 @@ mod frames;
 mod learned;
 mod paths;
 mod puncture;
+mod pushed;
 mod refusals;
 mod repeatability;
 mod sequences;

@@ -1,5 +1,7 @@
 //! Laws of sequences in which the way matters: friction that sticks, slips and turns back, a bond that never heals, an eye under pressure.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 use retina_core::equilibrium::error::EquilibriumError;
 use retina_core::needle::{Needle, NeedleShape};
@@ -13,13 +15,13 @@ use retina_tests::tolerance::DISCRETISATION;
 
 use crate::support::{ask, at, force, largest_um, requests, straight};
 
-fn changed(name: &str, change: impl FnOnce(&mut Scene)) -> PreparedScene {
+fn changed(name: &str, change: impl FnOnce(&mut Scene)) -> Arc<PreparedScene> {
     let mut scene = Scene::built_in(name).unwrap();
     change(&mut scene);
-    PreparedScene::new(scene).unwrap()
+    Arc::new(PreparedScene::new(scene).unwrap())
 }
 
-fn rough(coefficient: f64) -> PreparedScene {
+fn rough(coefficient: f64) -> Arc<PreparedScene> {
     changed("flat", |scene| scene.friction_coefficient = coefficient)
 }
 
@@ -40,7 +42,7 @@ fn held(time_s: f64, x_mm: f64, depth_mm: f64) -> Step {
     Step { time_s, tip_mm: Some(Point3::new(x_mm, 0.0, -depth_mm)), ..Step::default() }
 }
 
-fn run(scene: &PreparedScene, sequence: &Sequence, resolution: Option<&Resolution>) -> Vec<StepOutcome> {
+fn run(scene: &Arc<PreparedScene>, sequence: &Sequence, resolution: Option<&Resolution>) -> Vec<StepOutcome> {
     let mut simulation = Simulation::at(scene, sequence, resolution, &mut Silent).unwrap();
     let mut outcomes = Vec::new();
     while let Some(outcome) = simulation.step(&mut Silent).unwrap_or_else(|error| panic!("{error}: {sequence:?}")) {
@@ -222,7 +224,7 @@ fn tissue_has_been_at_rest_under_its_pressure_for_ever() {
 }
 
 /// A bond that a push shears off.
-fn weak(rate_exponent: f64) -> PreparedScene {
+fn weak(rate_exponent: f64) -> Arc<PreparedScene> {
     changed("flat", |scene| {
         scene.tissue.bond =
             RetinalBond { strength_kpa: 1.0, fracture_energy_mn_per_mm: 0.06, rate_exponent, ..RetinalBond::default() };
@@ -244,7 +246,7 @@ fn what_has_let_go_never_heals() {
         held(5.0, 0.0, 0.16),
         held(6.0, 0.0, 0.2),
     ];
-    let adhering = |scene: &PreparedScene| run(scene, &sequence(named(&["adhesion"]), steps.clone()), None);
+    let adhering = |scene: &Arc<PreparedScene>| run(scene, &sequence(named(&["adhesion"]), steps.clone()), None);
     let outcomes = adhering(&weak(0.0));
     let damages: Vec<f64> = outcomes.iter().map(damage).collect();
     let reactions: Vec<f64> = outcomes.iter().map(|outcome| outcome.prediction.needle.reaction_mn.z).collect();
@@ -267,7 +269,7 @@ fn what_has_let_go_never_heals() {
 
 #[test]
 fn a_bond_holds_more_against_haste_and_no_more_against_patience() {
-    let pushed = |scene: &PreparedScene, time_s: f64| {
+    let pushed = |scene: &Arc<PreparedScene>, time_s: f64| {
         damage(&run(scene, &sequence(named(&["adhesion"]), vec![held(time_s, 0.0, 0.16)]), None)[0])
     };
     let (rated, plain) = (weak(0.5), weak(0.0));
@@ -281,7 +283,7 @@ fn a_bond_holds_more_against_haste_and_no_more_against_patience() {
 
 #[test]
 fn auto_decides_by_what_all_steps_ask() {
-    let decided = |scene: &PreparedScene, steps: Vec<Step>, name: &str| {
+    let decided = |scene: &Arc<PreparedScene>, steps: Vec<Step>, name: &str| {
         let sequence = sequence(EffectChoice::Auto, steps);
         let simulation = Simulation::new(scene, &sequence, &mut Silent).unwrap();
         let report = simulation.effects().iter().find(|report| report.name == name).unwrap().clone();

@@ -1,5 +1,7 @@
 //! Laws of sequences: a static step is an equilibrium of its own, memory fades, and an effect that is off leaves no trace.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::finite_element::Resolution;
@@ -38,17 +40,21 @@ fn held(time_s: f64, x_mm: f64, depth_mm: f64) -> Step {
     Step { time_s, tip_mm: Some(Point3::new(x_mm, 0.0, -depth_mm)), ..Step::default() }
 }
 
-fn run(scene: &PreparedScene, sequence: &Sequence) -> Vec<StepOutcome> {
+fn run(scene: &Arc<PreparedScene>, sequence: &Sequence) -> Vec<StepOutcome> {
     run_on(scene, sequence, None)
 }
 
-fn run_on(scene: &PreparedScene, sequence: &Sequence, resolution: Option<&Resolution>) -> Vec<StepOutcome> {
+fn run_on(scene: &Arc<PreparedScene>, sequence: &Sequence, resolution: Option<&Resolution>) -> Vec<StepOutcome> {
     let mut simulation = Simulation::at(scene, sequence, resolution, &mut Silent).unwrap();
     let mut outcomes = Vec::new();
     while let Some(outcome) = simulation.step(&mut Silent).unwrap_or_else(|error| panic!("{error}: {sequence:?}")) {
         outcomes.push(outcome);
     }
     outcomes
+}
+
+fn prepared(scene: Scene) -> Arc<PreparedScene> {
+    Arc::new(PreparedScene::new(scene).unwrap())
 }
 
 fn reaction(outcome: &StepOutcome) -> f64 {
@@ -62,7 +68,7 @@ fn apart_um(a: &[Point3<f64>], b: &[Point3<f64>]) -> f64 {
 
 #[test]
 fn a_sequence_of_one_static_step_is_the_prediction_bit_by_bit() {
-    let scene = PreparedScene::new(without_relaxation("macula")).unwrap();
+    let scene = prepared(without_relaxation("macula"));
     for request in requests(&scene, 31, 8) {
         let mut alone = ask(&scene, &crate::support::at(&request, Level::Coarse)).unwrap();
         let step = Step { time_s: 10.0, force_mn: Some(force(&request)), ..Step::default() };
@@ -168,7 +174,7 @@ fn held_tissue_relaxes_from_stiff_to_the_elastic_answer() {
     let left = forces[forces.len() - 1] / elastic - 1.0;
     assert!((0.0..1e-3).contains(&left), "{left}");
     // Nothing relaxes in a retina without networks, which is the same bits as one whose networks are off.
-    let dead = PreparedScene::new(without_relaxation("flat")).unwrap();
+    let dead = prepared(without_relaxation("flat"));
     let steps = vec![held(1e-6, 0.0, 0.06), held(1000.0, 0.0, 0.06)];
     let still = run(&dead, &sequence(with(&["viscoelasticity"]), steps.clone()));
     let off = run(&scene, &sequence(with(&[]), steps));
@@ -224,7 +230,7 @@ fn auto_takes_what_remembers_by_the_ratio_of_times() {
     let fast = [(1e-4, true, true), (0.2, true, false), (900.0, false, false)];
     let mut scene = Scene::built_in("macula").unwrap();
     scene.tissue.rate.retina_relaxation = vec![PronyTerm { relaxation_time_s: 1.0, share: 0.5 }];
-    let scene = PreparedScene::new(scene).unwrap();
+    let scene = prepared(scene);
     for (time_s, viscoelastic, inert) in fast {
         let sequence = sequence(EffectChoice::Auto, vec![pushed(time_s, 0.4)]);
         let simulation = Simulation::new(&scene, &sequence, &mut Silent).unwrap();

@@ -15,8 +15,8 @@ pub use retina_tests::cap::cap;
 pub const FAST: [Level; 2] = [Level::Linear, Level::Coarse];
 
 /// A built-in scene.
-pub fn built_in(name: &str) -> PreparedScene {
-    PreparedScene::new(Scene::built_in(name).unwrap()).unwrap()
+pub fn built_in(name: &str) -> Arc<PreparedScene> {
+    Arc::new(PreparedScene::new(Scene::built_in(name).unwrap()).unwrap())
 }
 
 /// The answer, with a workspace of its own.

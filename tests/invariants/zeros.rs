@@ -1,5 +1,7 @@
 //! No force, no contact: nothing moves, exactly.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 use retina_core::predict::{
     ContactState, Control, EffectChoice, Level, PredictError, Prediction, PreparedScene, Request,
@@ -8,10 +10,10 @@ use retina_core::scene::Scene;
 
 use crate::support::{ask, at, built_in, cap, largest_um, mesh_scene, straight};
 
-fn scenes() -> Vec<PreparedScene> {
+fn scenes() -> Vec<Arc<PreparedScene>> {
     let (vertices, triangles) = cap();
-    let mut scenes: Vec<PreparedScene> = Scene::built_in_names().iter().map(|name| built_in(name)).collect();
-    scenes.push(mesh_scene(vertices, triangles));
+    let mut scenes: Vec<Arc<PreparedScene>> = Scene::built_in_names().iter().map(|name| built_in(name)).collect();
+    scenes.push(Arc::new(mesh_scene(vertices, triangles)));
     scenes
 }
 

@@ -26,12 +26,12 @@ fn ramp(steps: usize) -> Value {
     })
 }
 
-fn lines(text: &str) -> Vec<Value> {
+pub fn lines(text: &str) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).expect("one JSON object a line")).collect()
 }
 
 /// Status, media type and body of a simulation over a socket.
-fn simulate(service: &Running, request: &Value) -> (u16, String, String) {
+pub fn simulate(service: &Running, request: &Value) -> (u16, String, String) {
     let post = agent().post(service.url("/v1/simulate")).header("content-type", "application/json");
     let mut response = post.send(request.to_string()).expect("answer");
     let media_type = response.headers()["content-type"].to_str().expect("text").to_owned();
@@ -101,7 +101,7 @@ fn punctured_tissue_stays_punctured() {
     let states: Vec<&str> = steps.iter().map(|step| step["contact"]["state"].as_str().expect("state")).collect();
     // 0.08, 0.16, 0.24, 0.32 mN, then nothing.
     assert_eq!(states, ["touching", "touching", "punctured", "punctured", "punctured"]);
-    let since = |step: &&&Value| step["warnings"].to_string().contains("punctured since steps[2] at");
+    let since = |step: &&&Value| step["warnings"].to_string().contains("punctured since");
     assert_eq!(steps.iter().filter(since).count(), 2);
     let row = lines[0]["begin"]["effects"].as_array().expect("list").iter().find(|effect| effect["name"] == "puncture");
     assert!(row.expect("always there")["value"].as_f64() > Some(0.3), "{row:?}");

@@ -1,6 +1,7 @@
 //! `GET /v1/stream`: what comes back, who wins, what is refused, who is taken for gone.
 
 mod going;
+mod memory;
 mod pace;
 mod refused;
 

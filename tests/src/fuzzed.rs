@@ -83,7 +83,11 @@ pub fn stream(bytes: &[u8]) {
     if let Err(problem) = binary::pose(bytes) {
         refused(&problem);
     }
-    if let Err(problem) = read::<StreamCommand>(bytes) {
+    let opened = read::<StreamCommand>(bytes).and_then(|command| {
+        let opening = command.open.map(|spec| understand::opening(&spec, MOST_STEPS));
+        opening.transpose().map(|_| ())
+    });
+    if let Err(problem) = opened {
         refused(&problem);
     }
 }

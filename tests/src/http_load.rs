@@ -5,7 +5,8 @@
 //! `content-length`.
 
 use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
-use std::net::{SocketAddr, TcpStream};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -25,11 +26,45 @@ pub struct Measured {
     pub p50_ms: f64,
     /// 99 of 100 of them come within this time (ms).
     pub p99_ms: f64,
+    /// Share of the machine's time that other programs had meanwhile; not a number where it is not known.
+    pub others_share: f64,
+    /// Share of the machine's time that the hypervisor gave to others; not a number where it is not known.
+    pub stolen_share: f64,
+}
+
+/// What Linux counts processor time in.
+const TICKS_PER_SECOND: f64 = 100.0;
+
+/// Processor time of the whole machine, in all since it began (s), where Linux tells it.
+#[derive(Clone, Copy, Debug)]
+struct MachineTime {
+    busy_s: f64,
+    stolen_s: f64,
+    all_s: f64,
+}
+
+impl MachineTime {
+    fn now() -> Option<Self> {
+        let text = std::fs::read_to_string("/proc/stat").ok()?;
+        let line = text.lines().next()?.split_whitespace().skip(1).take(8);
+        let ticks: Vec<f64> = line.map(str::parse).collect::<Result<_, _>>().ok()?;
+        let &[user, nice, system, idle, waiting, interrupts, soft, stolen] = ticks.as_slice() else { return None };
+        let busy = user + nice + system + interrupts + soft;
+        let all = busy + idle + waiting + stolen;
+        let [busy_s, stolen_s, all_s] = [busy, stolen, all].map(|ticks| ticks / TICKS_PER_SECOND);
+        Some(Self { busy_s, stolen_s, all_s })
+    }
+
+    /// Shares of the time since `before` that other programs had, and that the hypervisor gave to others, where this process had `own_s`.
+    fn shares_since(&self, before: &Self, own_s: f64) -> (f64, f64) {
+        let all_s = self.all_s - before.all_s;
+        let others_s = (self.busy_s - before.busy_s - own_s).max(0.0);
+        (others_s / all_s, (self.stolen_s - before.stolen_s) / all_s)
+    }
 }
 
 /// Processor time that this process has used (s), where Linux tells it, in hundredths of a second: what an answer costs whatever else runs on the machine.
 pub fn cpu_seconds() -> Option<f64> {
-    const TICKS_PER_SECOND: f64 = 100.0;
     let text = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The name of the program, in parentheses, may have spaces; user and system time are the 12th and 13th number after it.
     let mut numbers = text.rsplit(')').next()?.split_whitespace().skip(11).map(str::parse::<f64>);
@@ -93,6 +128,46 @@ impl Client {
     }
 }
 
+/// Starts a server that sends the same answer to every request as soon as it has come: what clients, sockets and the system's scheduling take by themselves.
+/// A thread for each connection; they end with the process.
+///
+/// # Errors
+/// Those of the socket.
+pub fn start_empty(answer: &[u8]) -> io::Result<SocketAddr> {
+    let listener = TcpListener::bind("127.0.0.1:0")?;
+    let address = listener.local_addr()?;
+    let head = format!("HTTP/1.1 200 OK\r\ncontent-length: {}\r\n\r\n", answer.len());
+    let answer: Arc<[u8]> = [head.as_bytes(), answer].concat().into();
+    thread::spawn(move || {
+        for socket in listener.incoming().flatten() {
+            let answer = Arc::clone(&answer);
+            // A client that goes ends its thread.
+            thread::spawn(move || answer_all(socket, &answer));
+        }
+    });
+    Ok(address)
+}
+
+/// Sends `answer` to every request of [`post`] that comes.
+fn answer_all(socket: TcpStream, answer: &[u8]) -> io::Result<()> {
+    socket.set_nodelay(true)?;
+    let (mut reader, mut line, mut length, mut body) = (BufReader::new(socket), String::new(), 0, Vec::new());
+    loop {
+        line.clear();
+        if reader.read_line(&mut line)? == 0 {
+            return Ok(());
+        }
+        if let Some(value) = line.strip_prefix("content-length: ") {
+            length = value.trim().parse().map_err(io::Error::other)?;
+        }
+        if line.trim_end().is_empty() {
+            body.resize(length, 0);
+            reader.read_exact(&mut body)?;
+            reader.get_mut().write_all(answer)?;
+        }
+    }
+}
+
 /// When the next request of a connection is sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
@@ -115,7 +190,7 @@ pub fn measure(
     turn: Duration,
     pace: Pace,
 ) -> io::Result<Measured> {
-    let (began, before) = (Instant::now() + CONNECTING, cpu_seconds());
+    let (began, before, machine_before) = (Instant::now() + CONNECTING, cpu_seconds(), MachineTime::now());
     let one = |first: usize| -> io::Result<Vec<f64>> {
         let (mut client, mut body, mut times_ms) = (Client::connect(address)?, Vec::new(), Vec::new());
         thread::sleep(began.saturating_duration_since(Instant::now()));
@@ -149,5 +224,8 @@ pub fn measure(
     let at = |share: f64| quantile(&times_ms, share);
     let cpu_s = cpu_seconds().zip(before).map_or(f64::NAN, |(after, before)| after - before);
     let (count, cpu_us) = (times_ms.len() as f64, 1e6 * cpu_s / times_ms.len() as f64);
-    Ok(Measured { per_second: count / seconds, cpu_us, p50_ms: at(0.5), p99_ms: at(0.99) })
+    let machine = MachineTime::now().zip(machine_before);
+    let (others_share, stolen_share) =
+        machine.map_or((f64::NAN, f64::NAN), |(now, before)| now.shares_since(&before, cpu_s));
+    Ok(Measured { per_second: count / seconds, cpu_us, p50_ms: at(0.5), p99_ms: at(0.99), others_share, stolen_share })
 }

@@ -67,6 +67,8 @@ pub struct BinaryAnswer {
     pub p95_um: f32,
     /// Effects simulated, one bit each.
     pub effects: u32,
+    /// The pose's time in a session with memory (s).
+    pub time_s: f64,
     /// Deformed nodes (mm).
     pub vertices_mm: Vec<[f32; 3]>,
     /// Unit normals.
@@ -156,6 +158,19 @@ pub fn encode_pose(
     bytes
 }
 
+/// The same pose at a time, in a session with memory.
+pub fn at_time(mut pose: Vec<u8>, time_s: f64) -> Vec<u8> {
+    pose[6] |= 2;
+    pose.extend(time_s.to_le_bytes());
+    pose
+}
+
+/// The same pose of a needle that is where the last pose left it.
+pub fn where_it_is(mut pose: Vec<u8>) -> Vec<u8> {
+    pose[6] |= 4;
+    pose
+}
+
 /// Reads numbers one after the other.
 struct Reader<'a>(&'a [u8]);
 
@@ -211,13 +226,14 @@ pub fn decode(bytes: &[u8]) -> Option<BinaryAnswer> {
         median_um: reader.f32()?,
         p95_um: reader.f32()?,
         effects: reader.u32()?,
+        time_s: f64::from_le_bytes(reader.take()?),
         vertices_mm: Vec::new(),
         normals: Vec::new(),
         displacement_um: Vec::new(),
         triangles: Vec::new(),
         source_indices: Vec::new(),
     };
-    if reader.take::<12>()? != [0; 12] {
+    if reader.take::<4>()? != [0; 4] {
         return None;
     }
     answer.vertices_mm = (0..nodes).map(|_| reader.vector()).collect::<Option<_>>()?;

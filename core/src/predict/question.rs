@@ -30,6 +30,14 @@ impl CutOrGrid<'_> {
             CutOrGrid::Cut(patch) => patch,
         }
     }
+
+    /// The patch for one who keeps it.
+    pub(crate) fn into_patch(self) -> Patch {
+        match self {
+            CutOrGrid::Grid(patch) => patch.clone(),
+            CutOrGrid::Cut(patch) => *patch,
+        }
+    }
 }
 
 /// A request in the patch frame.

@@ -3,6 +3,8 @@
 //! The start is the state before, moved by the difference of what linear elasticity expects of the two steps: exact for small steps, as good as
 //! a fresh start for large ones. A needle that is held where it was starts from the state before as it is.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::history::History;
@@ -32,7 +34,7 @@ struct Aim {
     warnings: Vec<String>,
 }
 
-impl Simulation<'_> {
+impl Simulation {
     /// The answer to `step`, and whether a mesh was laid for it.
     pub(super) fn advance_at_once(
         &mut self,
@@ -40,44 +42,47 @@ impl Simulation<'_> {
         progress: &mut dyn Progress,
     ) -> Result<(Prediction, bool), PredictError> {
         progress.stage("linear");
-        let request = self.sequence.request(step, &self.needle);
-        let (prepared, body) = (self.prepared, self.body);
-        // The patch is taken out so that the question may borrow it while the rest of the state changes.
-        let patch = self.patch.patch().clone();
-        let question = Question::new(prepared, &request, &body, CutOrGrid::Grid(&patch));
+        let request = self.sequence.request(step, &self.state.needle);
+        request.needle.validate()?;
+        // Taken out so that the question may borrow them while the rest changes.
+        let (prepared, body, patch) = (Arc::clone(&self.prepared), self.body, self.patch.clone());
+        let question = Question::new(&prepared, &request, &body, CutOrGrid::Grid(&patch));
         let linear = pressed(&question, &self.plan.sink)?;
+        let (met, unforeseen) = self.met(&question, linear.as_ref())?;
         let (mut prediction, laid) = if self.decision.contact && (linear.is_some() || self.is_strained(&question)) {
-            self.solve(&question, linear.as_ref(), step.time_s - self.time_s, progress)?
+            self.solve(&question, linear.as_ref(), step.time_s - self.state.time_s, progress)?
         } else {
-            self.settled = None;
+            self.state.settled = None;
             let why = match (self.decision.contact, question.motion.force_mn) {
                 (false, _) => "contact is not simulated",
                 (true, Some(0.0)) => "no force is applied",
                 (true, _) => "the needle does not reach the surface",
             };
-            if let Some(history) = &mut self.history {
+            if let Some(history) = &mut self.state.history {
                 history.grip = Grip::default();
             }
             (question.at_rest(self.decision.clone(), self.plan.sink.change_kpa, why), false)
         };
+        self.state.met = met;
+        prediction.warnings.extend(unforeseen);
         self.remember_puncture(&mut prediction, step.time_s);
         // What is handed on is the guide's place, where a needle without a load would be.
-        self.needle.tip_mm = prediction.needle.tip_mm - prediction.needle.deflection_mm.unwrap_or_default();
-        self.needle.orientation = request.needle.orientation;
+        self.state.needle.tip_mm = prediction.needle.tip_mm - prediction.needle.deflection_mm.unwrap_or_default();
+        self.state.needle.orientation = request.needle.orientation;
         Ok((prediction, laid))
     }
 
     /// Tissue that was punctured stays so: the steps that follow say since when.
     fn remember_puncture(&mut self, prediction: &mut Prediction, time_s: f64) {
-        match self.punctured {
-            Some((step, time_s)) => {
+        let is_punctured = prediction.contact.state == ContactState::Punctured;
+        match self.state.punctured_s {
+            Some(since_s) => {
                 prediction.contact.state = ContactState::Punctured;
                 prediction.warnings.push(format!(
-                    "the tissue is punctured since steps[{step}] at {time_s} s; the surface is that of tissue as if it were still whole"
+                    "the tissue is punctured since {since_s} s; the surface is that of tissue as if it were still whole"
                 ));
             }
-            None if prediction.contact.state == ContactState::Punctured => self.punctured = Some((self.next, time_s)),
-            None => {}
+            None => self.state.punctured_s = is_punctured.then_some(time_s),
         }
     }
 
@@ -85,14 +90,16 @@ impl Simulation<'_> {
     fn is_strained(&self, question: &Question) -> bool {
         let withdrawn = question.motion.force_mn == Some(0.0);
         let kept = |history: &History| history.damage() > Some(0.0) || (history.grip.holds() && !withdrawn);
-        self.rates.any() || self.history.as_ref().is_some_and(kept)
+        self.rates.any() || self.state.history.as_ref().is_some_and(kept)
     }
 
     /// Whether the needle is held where the step before left it.
     fn unmoved(&self, question: &Question) -> bool {
         let needle = &question.request.needle;
-        let stays = (needle.tip_mm, needle.orientation) == (self.needle.tip_mm, self.needle.orientation);
-        stays && question.motion.force_mn.is_none() && self.settled.as_ref().is_some_and(|settled| settled.pressed)
+        let stays = (needle.tip_mm, needle.orientation) == (self.state.needle.tip_mm, self.state.needle.orientation);
+        stays
+            && question.motion.force_mn.is_none()
+            && self.state.settled.as_ref().is_some_and(|settled| settled.pressed)
     }
 
     /// The mesh of a step: that which is laid, or a new one where that does not fit and nothing is remembered.
@@ -106,15 +113,12 @@ impl Simulation<'_> {
         let contact = linear.map(|linear| question.estimate(linear, self.decision.tool_flex));
         let remembers = self.remembers();
         let fitting = |mesh: &ContactEstimate| contact.as_ref().is_none_or(|contact| fits(mesh, contact));
-        let kept = self.laid.clone().filter(|laid| remembers || self.unmoved(question) || fitting(&laid.contact));
+        let kept = self.state.laid.clone().filter(|laid| remembers || self.unmoved(question) || fitting(&laid.contact));
         let laid = match &kept {
             Some(laid) => laid.clone(),
             None => {
-                let (mut around, warning) = match remembers {
-                    true => self.plan.middle().unwrap_or((NO_CONTACT, None)),
-                    // A step whose contact turned out other than planned gets a mesh of its own.
-                    false => (self.plan.aim(self.next).filter(fitting).or(contact).unwrap_or(NO_CONTACT), None),
-                };
+                let planned = self.plan.around.clone().filter(|_| remembers);
+                let (mut around, warning) = planned.or(contact.map(|own| (own, None))).unwrap_or((NO_CONTACT, None));
                 if let (Level::Reference, Some(linear)) = (question.request.level, linear.filter(|_| !remembers)) {
                     // The finer mesh is made for the contact that `coarse` finds, as in a single prediction.
                     let change_kpa = self.plan.sink.change_kpa;
@@ -123,11 +127,11 @@ impl Simulation<'_> {
                         .estimate;
                     around = ContactEstimate { center: found.center, radius_mm: found.radius_mm, ..around };
                 }
-                self.settled = None;
-                Laid { contact: around, size: problem.mesh(self.resolution, &around), warning }
+                self.state.settled = None;
+                Laid { contact: around, size: problem.mesh(&self.resolution, &around), warning }
             }
         };
-        self.laid = Some(laid.clone());
+        self.state.laid = Some(laid.clone());
         let left = contact.as_ref().filter(|_| remembers).and_then(|contact| outside(&laid.contact, contact));
         let warnings = laid.warning.into_iter().chain(left).collect();
         Ok(Aim { contact, size: laid.size, laid: kept.is_none(), warnings })
@@ -144,15 +148,15 @@ impl Simulation<'_> {
         let aim = self.aim(question, linear, &problem, progress)?;
         progress.stage("mesh");
         let topology = self.topology.clone();
-        let wall = problem.wall(&topology, self.resolution, &aim.size)?;
+        let wall = problem.wall(&topology, &self.resolution, &aim.size)?;
         let pressure = problem.pressure_kpa.map(|pressure_kpa| Pressure { pressure_kpa });
         let pressing: Vec<Addition> = pressure.iter().map(|effect| Addition { effect, place: Place::Faces }).collect();
-        if self.remembers() && self.history.is_none() {
-            self.history = Some(self.begin(&wall, &pressing, progress)?);
+        if self.remembers() && self.state.history.is_none() {
+            self.state.history = Some(self.begin(&wall, &pressing, progress)?);
         }
         let withdrawn = question.motion.force_mn == Some(0.0);
         let (motion, touch_mm) = match &aim.contact {
-            Some(contact) => problem.aimed(&wall, self.resolution, contact),
+            Some(contact) => problem.aimed(&wall, &self.resolution, contact),
             None => {
                 let travel_mm = if withdrawn { -WITHDRAWN_MM } else { 0.0 };
                 let direction = question.tool.patch_from_needle.rotation * -Vector3::z_axis();
@@ -170,27 +174,27 @@ impl Simulation<'_> {
         let coefficient = problem.friction_coefficient.filter(|_| !withdrawn);
         let load = Load { motion: &motion, touch_mm, additions: &pressing };
         let (equilibrium, rubbing, grip) = self.balance(&wall, &load, coefficient, step_s, start, progress)?;
-        if let Some(history) = &mut self.history {
+        if let Some(history) = &mut self.state.history {
             history.commit(&wall, &equilibrium.positions, grip, step_s);
         }
         progress.stage("surface");
-        let mut answer = problem.answer(&wall, self.resolution, &equilibrium, touch_mm);
+        let mut answer = problem.answer(&wall, &self.resolution, &equilibrium, touch_mm);
         if let Some(rubbing) = &rubbing {
             answer.contact.rub(rubbing);
         }
-        answer.contact.bond_damage = self.history.as_ref().and_then(History::damage);
+        answer.contact.bond_damage = self.state.history.as_ref().and_then(History::damage);
         if withdrawn {
             (answer.travel_mm, answer.deflection) = (0.0, None);
         } else {
             answer = question.with_node_penetration(answer);
         }
-        self.settled = Some(Settled { positions: equilibrium.positions, expected, pressed: linear.is_some() });
+        self.state.settled = Some(Settled { positions: equilibrium.positions, expected, pressed: linear.is_some() });
         let mut expected_error = match linear {
             Some(linear) => question.situation_under(linear).expected_error(question.request.level),
             None => ExpectedError::UNKNOWN,
         };
         // Quantiles were measured on single equilibria.
-        expected_error.calibrated &= self.history.is_none();
+        expected_error.calibrated &= self.state.history.is_none();
         let mut prediction = question.prediction(answer, self.decision.clone(), expected_error);
         prediction.warnings.extend(aim.warnings);
         Ok((prediction, aim.laid))
@@ -234,7 +238,7 @@ impl Simulation<'_> {
     ) -> Result<(Equilibrium, Option<Rubbing>, Grip), PredictError> {
         let solver = &mut self.solver;
         let free = Grip::default();
-        let grip = self.history.as_ref().map_or(&free, |history| &history.grip);
+        let grip = self.state.history.as_ref().map_or(&free, |history| &history.grip);
         let rubs = self.decision.friction;
         let solve = |additions: &[Addition]| {
             let load = Load { additions, ..*load };
@@ -249,7 +253,7 @@ impl Simulation<'_> {
                 }
             }
         };
-        let found = match &self.history {
+        let found = match &self.state.history {
             Some(history) => history.with_additions(wall, step_s, load.additions, solve),
             None => solve(load.additions),
         };
@@ -259,7 +263,7 @@ impl Simulation<'_> {
 
     /// Positions to start from.
     fn start(&self, expected: &[f64], motion: &Motion, unmoved: bool) -> Vec<f64> {
-        let Some(settled) = &self.settled else { return expected.to_vec() };
+        let Some(settled) = &self.state.settled else { return expected.to_vec() };
         if unmoved {
             return settled.positions.clone();
         }

@@ -15,7 +15,7 @@ use crate::solve::newton::NewtonError;
 /// How often a part may be halved.
 pub const MOST_CUTS: usize = 3;
 
-impl Simulation<'_> {
+impl Simulation {
     /// The answer to `step`, and whether a mesh was laid for it.
     pub(super) fn advance(
         &mut self,
@@ -43,8 +43,8 @@ impl Simulation<'_> {
         let failure = match self.advance_at_once(step, progress) {
             Ok(found) => {
                 *parts += 1;
-                self.time_s = step.time_s;
-                self.reaction_mn = found.0.needle.reaction_mn;
+                self.state.time_s = step.time_s;
+                self.state.reaction_mn = found.0.needle.reaction_mn;
                 return Ok(found);
             }
             Err(failure) => failure,
@@ -66,16 +66,16 @@ impl Simulation<'_> {
         let force_mn = match step.force_mn {
             Some(force) if force == Vector3::zeros() => return None,
             Some(force) => {
-                let borne_mn = (-self.reaction_mn.dot(&force.normalize())).max(0.0);
+                let borne_mn = (-self.state.reaction_mn.dot(&force.normalize())).max(0.0);
                 Some(force.normalize() * (0.5 * (borne_mn + force.norm())))
             }
             None => None,
         };
-        let middle = |tip| nalgebra::center(&self.needle.tip_mm, &tip);
+        let middle = |tip| nalgebra::center(&self.state.needle.tip_mm, &tip);
         Some(Step {
-            time_s: 0.5 * (self.time_s + step.time_s),
+            time_s: 0.5 * (self.state.time_s + step.time_s),
             tip_mm: step.tip_mm.map(middle),
-            orientation: step.orientation.map(|end| self.needle.orientation.nlerp(&end, 0.5)),
+            orientation: step.orientation.map(|end| self.state.needle.orientation.nlerp(&end, 0.5)),
             force_mn,
         })
     }

@@ -1,26 +1,31 @@
-//! Every step by linear elasticity, before the first is computed: checks, expected contacts, and which steps one mesh fits.
+//! Every step by linear elasticity, before the first is computed: checks, expected contacts, and the mesh for all of them.
 //!
 //! Checking takes a fraction of a millisecond a step, so a sequence that cannot be is refused before it begins. Where a step leaves its
 //! needle's place to the step before, linear elasticity says where that is.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
-use super::{Sequence, SequenceError, Step, TIME_STEP};
+use super::worst::Worst;
+use super::{Sequence, SequenceError, Step, check_time};
 use crate::effects::bleb;
 use crate::needle::{Body, Needle};
+use crate::patch::Patch;
 use crate::predict::choice::{Decision, Expected};
 use crate::predict::finite_element::ContactEstimate;
 use crate::predict::linear::LinearAnswer;
 use crate::predict::{Control, CutOrGrid, EffectChoice, PredictError, PreparedScene, Question, Request, Sink};
 use crate::progress::Progress;
-use crate::range::ParameterRange;
 use crate::solve::newton::NewtonError;
 
 /// What linear elasticity expects of a sequence.
 pub(super) struct Plan {
-    /// The contact of each step; `None` where the needle does not press.
-    pub contacts: Vec<Option<ContactEstimate>>,
-    /// What was expected for that, the worst of all steps.
+    /// The contact to lay one mesh around for all steps, and what the caller should know of such a mesh; `None` where the needle presses in no step.
+    pub around: Option<(ContactEstimate, Option<String>)>,
+    /// Whether that mesh resolves every contact as well as one of its own would.
+    pub is_one_contact: bool,
+    /// What is expected before anything is pressed.
+    pub unpressed: Worst,
+    /// What was expected for the decision, the worst of all steps.
     pub expected: Expected,
     /// Whether the needle is held in the tissue in some step: what it presses with is then the tissue's to say.
     pub is_held: bool,
@@ -40,97 +45,24 @@ const LARGEST_REACH: f64 = 1.25;
 /// Fine zone of a lasting mesh, in radii of the largest contact, from which on its elements are coarse for every contact.
 const WIDEST_ZONE: f64 = 2.0;
 
-impl Plan {
-    /// The contact to lay a mesh around for step `from` and as many after it as that mesh fits: the largest of theirs.
-    pub fn aim(&self, from: usize) -> Option<ContactEstimate> {
-        let mut held: Vec<ContactEstimate> = Vec::new();
-        let mut aim: Option<ContactEstimate> = None;
-        for contact in self.contacts[from..].iter().flatten() {
-            // The first one that is not fitted ends the run: what follows gets a mesh of its own.
-            let wider = aim.filter(|aim| aim.radius_mm >= contact.radius_mm).unwrap_or(*contact);
-            held.push(*contact);
-            if !held.iter().all(|contact| fits(&wider, contact)) {
-                break;
-            }
-            aim = Some(wider);
-        }
-        aim
-    }
-
-    /// Whether one mesh resolves every contact as well as one of its own would.
-    pub fn is_one_contact(&self) -> bool {
-        let middle = self.middle();
-        self.contacts.iter().flatten().all(|contact| middle.as_ref().is_some_and(|(middle, _)| fits(middle, contact)))
-    }
-
-    /// The contact to lay one mesh around for all steps: in the middle of all contacts, and as wide as all together. What the caller should know
-    /// of such a mesh.
-    pub fn middle(&self) -> Option<(ContactEstimate, Option<String>)> {
-        let contacts = || self.contacts.iter().flatten();
-        let largest = contacts().copied().reduce(|a, b| if b.radius_mm > a.radius_mm { b } else { a })?;
-        let center = [0, 1].map(|k| {
-            let (low, high) = contacts().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), contact| {
-                (low.min(contact.center[k]), high.max(contact.center[k]))
-            });
-            0.5 * (low + high)
+/// The contact in the middle of all contacts, as wide as all together, and what the caller should know of a mesh laid around it.
+fn middle(contacts: &[ContactEstimate]) -> Option<(ContactEstimate, Option<String>)> {
+    let largest = contacts.iter().copied().reduce(|a, b| if b.radius_mm > a.radius_mm { b } else { a })?;
+    let center = [0, 1].map(|k| {
+        let (low, high) = contacts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), contact| {
+            (low.min(contact.center[k]), high.max(contact.center[k]))
         });
-        let middle = ContactEstimate { center, ..largest };
-        let radius_mm = contacts().map(|contact| reach_mm(&middle, contact)).fold(0.0, f64::max);
-        let warning = (radius_mm > WIDEST_ZONE * largest.radius_mm).then(|| {
-            format!(
-                "the contacts wander over {radius_mm:.3} mm around the middle of the mesh, which is coarse for contacts of {:.3} mm radius",
-                largest.radius_mm
-            )
-        });
-        Some((ContactEstimate { radius_mm, ..middle }, warning))
-    }
-}
-
-/// What was worst so far of what decides about the effects.
-struct Worst {
-    /// The deepest contact with the largest slide, pull and bending of any.
-    expected: Expected,
-    /// The depth of that contact (mm).
-    depth_mm: f64,
-    /// How far the pressed needle has moved along the surface (mm).
-    along_mm: f64,
-    /// Contact centre (patch parameters) and orientation of the step before, if it pressed.
-    before: Option<([f64; 2], UnitQuaternion<f64>)>,
-}
-
-impl Worst {
-    /// Takes a step into account.
-    fn meet(&mut self, question: &Question, linear: Option<&LinearAnswer>, sink: &Sink) {
-        let bending = question.bending(linear);
-        let worst = &mut self.expected;
-        if bending.across_mn > worst.bending.across_mn {
-            worst.bending = bending;
-        }
-        let orientation = question.request.needle.orientation;
-        let Some(linear) = linear else {
-            self.before = None;
-            return;
-        };
-        if let Some((center, before)) = self.before {
-            let [x, y] = [0, 1].map(|k| linear.center[k] - center[k]);
-            // A needle that turns drags along what lies at the edge of its contact.
-            self.along_mm += x.hypot(y) + before.angle_to(&orientation) * linear.contact_radius_mm;
-        }
-        self.before = Some((linear.center, orientation));
-        let mut expected = question.expected(linear, sink);
-        expected.sliding.along_mm = self.along_mm;
-        let share = (self.along_mm / linear.depth_mm).min(expected.sliding.coefficient);
-        let share = share.max(expected.pull.tangential_share).max(worst.pull.tangential_share);
-        if linear.depth_mm > self.depth_mm {
-            self.depth_mm = linear.depth_mm;
-            let sliding = worst.sliding;
-            *worst = Expected { sliding, bending: worst.bending, ..expected };
-        }
-        worst.pull.tangential_share = share;
-        if expected.sliding.dragged_um() > worst.sliding.dragged_um() {
-            worst.sliding = expected.sliding;
-        }
-    }
+        0.5 * (low + high)
+    });
+    let middle = ContactEstimate { center, ..largest };
+    let radius_mm = contacts.iter().map(|contact| reach_mm(&middle, contact)).fold(0.0, f64::max);
+    let warning = (radius_mm > WIDEST_ZONE * largest.radius_mm).then(|| {
+        format!(
+            "the contacts wander over {radius_mm:.3} mm around the middle of the mesh, which is coarse for contacts of {:.3} mm radius",
+            largest.radius_mm
+        )
+    });
+    Some((ContactEstimate { radius_mm, ..middle }, warning))
 }
 
 fn offset_mm(mesh: &ContactEstimate, contact: &ContactEstimate) -> f64 {
@@ -171,17 +103,7 @@ impl Sequence {
     fn check_times(&self) -> Result<(), SequenceError> {
         let mut before_s = 0.0;
         for (index, step) in self.steps.iter().enumerate() {
-            let step_s = step.time_s - before_s;
-            // Times a bound apart differ by a little less or more once they are written with a finite number of digits.
-            let rounding_s = f64::EPSILON * step.time_s.abs();
-            let widened =
-                ParameterRange { min: TIME_STEP.min - rounding_s, max: TIME_STEP.max + rounding_s, ..TIME_STEP };
-            widened.check("", step_s).map_err(|_| SequenceError::Time {
-                step: index,
-                step_s,
-                min_s: TIME_STEP.min,
-                max_s: TIME_STEP.max,
-            })?;
+            check_time(before_s, step.time_s).map_err(|error| error.of(index, step.time_s))?;
             before_s = step.time_s;
         }
         Ok(())
@@ -200,12 +122,12 @@ pub(super) fn pressed<'b>(question: &'b Question, sink: &Sink) -> Result<Option<
 ///
 /// # Errors
 /// [`SequenceError`] of the first step that cannot be.
-pub(super) fn plan<'a>(
-    prepared: &'a PreparedScene,
+pub(super) fn plan(
+    prepared: &PreparedScene,
     sequence: &Sequence,
     body: &Body,
     progress: &mut dyn Progress,
-) -> Result<(CutOrGrid<'a>, Plan), SequenceError> {
+) -> Result<(Patch, Plan), SequenceError> {
     let loads = |step: &&Step| step.force_mn.is_none_or(|force| force != Vector3::zeros());
     let first = sequence.steps.iter().find(loads).or(sequence.steps.first()).ok_or(SequenceError::NoSteps)?;
     sequence.check_times()?;
@@ -214,12 +136,13 @@ pub(super) fn plan<'a>(
         SequenceError::At { step: index, time_s, cause }
     };
     sequence.needle.validate().map_err(|error| at(0, error.into()))?;
-    let patch = prepared.patch_for(&sequence.request(first, &sequence.needle), body).map_err(|cause| at(0, cause))?;
     let request = sequence.request(first, &sequence.needle);
-    let first = Question::new(prepared, &request, body, CutOrGrid::Grid(patch.patch()));
+    let patch = prepared.patch_for(&request, body).map_err(|cause| at(0, cause))?.into_patch();
+    let first = Question::new(prepared, &request, body, CutOrGrid::Grid(&patch));
     let sink = first.sink_without_fluid();
-    let mut worst = Worst { expected: first.unpressed(&sink), depth_mm: 0.0, along_mm: 0.0, before: None };
-    let mut contacts = Vec::with_capacity(sequence.steps.len());
+    let unpressed = Worst::unpressed(first.unpressed(&sink));
+    let mut worst = unpressed;
+    let mut contacts = Vec::new();
     let mut fastest_change_s = f64::INFINITY;
     let mut is_held = false;
     let mut needle = sequence.needle;
@@ -231,11 +154,11 @@ pub(super) fn plan<'a>(
         }
         let request = sequence.request(step, &needle);
         request.needle.validate().map_err(|error| at(index, error.into()))?;
-        let question = Question::new(prepared, &request, body, CutOrGrid::Grid(patch.patch()));
+        let question = Question::new(prepared, &request, body, CutOrGrid::Grid(&patch));
         let linear = pressed(&question, &sink).map_err(|cause| at(index, cause))?;
         needle = request.needle;
         if let (Some(linear), Some(_)) = (&linear, step.force_mn) {
-            let direction = patch.patch().scene_from_patch * question.motion.direction.into_inner();
+            let direction = patch.scene_from_patch * question.motion.direction.into_inner();
             needle.tip_mm += direction * linear.travel_mm();
         }
         is_held |= step.force_mn.is_none() && linear.is_some();
@@ -245,12 +168,16 @@ pub(super) fn plan<'a>(
             fastest_change_s = fastest_change_s.min(step.time_s - before_s);
         }
         (before_s, load_before) = (step.time_s, load);
-        contacts.push(linear.as_ref().map(|linear| question.estimate(linear, false)));
+        contacts.extend(linear.as_ref().map(|linear| question.estimate(linear, false)));
     }
     let mut decision = first.decide(worst.expected, &sink).map_err(|cause| at(0, cause))?;
     leave_fluid_out(sequence, &mut decision).map_err(|cause| at(0, cause))?;
+    let around = middle(&contacts);
+    let fitted = |contact| around.as_ref().is_some_and(|(mesh, _)| fits(mesh, contact));
+    let is_one_contact = contacts.iter().all(fitted);
+    let expected = worst.expected;
     drop(first);
-    Ok((patch, Plan { contacts, expected: worst.expected, is_held, decision, sink, fastest_change_s }))
+    Ok((patch, Plan { around, is_one_contact, unpressed, expected, is_held, decision, sink, fastest_change_s }))
 }
 
 /// A sequence has no fluid under the retina: it says so, and refuses what names it.

@@ -75,6 +75,9 @@ pub struct Config {
     /// Streams that may be open at once.
     #[arg(long, env = "RETINA_STREAMS", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
     pub streams: u16,
+    /// Sessions with memory that streams may have at once.
+    #[arg(long, env = "RETINA_STREAM_MEMORIES", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
+    pub stream_memories: u16,
     /// Milliseconds after which a stream whose client is silent, pings unanswered, is closed.
     #[arg(long, env = "RETINA_STREAM_IDLE_MS", default_value_t = 60_000, value_parser = clap::value_parser!(u32).range(30..))]
     pub stream_idle_ms: u32,

@@ -13,7 +13,7 @@ use crate::stream::binary::Head;
 use crate::stream::protocol::Form;
 use crate::wire::igtl::{IgtlAnswer, IgtlMessage, IgtlOpened, IgtlProblem};
 use crate::wire::pose::PoseAnswer;
-use crate::wire::stream::OpenSpec;
+use crate::wire::stream::MemoryOpened;
 use crate::write::{Layout, write};
 
 /// Device name of what is no part of an answer.
@@ -41,7 +41,7 @@ impl Form for Answers {
     type Message = Bytes;
     type Tag = Tag;
 
-    fn opened(&self, _spec: &OpenSpec, triangles: &[[usize; 3]]) -> Result<Bytes, Problem> {
+    fn opened(&self, triangles: &[[usize; 3]], _memory: Option<MemoryOpened>) -> Result<Bytes, Problem> {
         let text = "A session is open: the needle as TRANSFORM (mm), the force as SENSOR (N) or STRING.";
         let mut bytes = encode(&self.stamp, "STATUS", SERVICE, &compose::status(compose::OK, 0, "OK", text));
         let opened = IgtlMessage::Opened(IgtlOpened { protocol: 1, axes: self.axes, triangles });

@@ -114,7 +114,8 @@ impl Conversation {
         let pose = StreamPose {
             sequence: self.count,
             client_time_us: None,
-            tip_mm: Vector(self.axes.turn(transform.translation_mm)),
+            time_s: None,
+            tip_mm: Some(Vector(self.axes.turn(transform.translation_mm))),
             orientation_xyzw: Some(Quaternion(orientation)),
             direction: None,
             force_mn: self.force_mn.map(|force| Vector(self.axes.turn(force))),
@@ -176,7 +177,8 @@ impl Conversation {
     fn opening(&self, open: IgtlOpen) -> Opening<Answers> {
         let answers = Answers { axes: self.axes, stamp: self.remark() };
         let IgtlOpen { scene, needle, accuracy, effects, axes: _ } = open;
-        Box::new(move || Ok((OpenSpec { scene, needle, accuracy, effects, format: Format::Binary }, answers)))
+        let spec = OpenSpec { scene, needle, accuracy, effects, memory: None, format: Format::Binary };
+        Box::new(move || Ok((spec, answers)))
     }
 }
 

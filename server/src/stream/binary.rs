@@ -13,13 +13,15 @@
 //! | 8 | u64 | sequence number |
 //! | 16 | f64 | the client's time, repeated by the answer |
 //!
-//! A pose, 64 bytes in all; flag 1: `force_mn` is given (else the needle is held and these three are 0):
+//! A pose, 64 bytes in all; flag 1: `force_mn` is given (else the needle is held and these three are 0). In a session with memory, flag 4: tip and orientation are left
+//! out, so the needle is where the last pose left it (these seven are 0), and flag 2: the pose has a time, which makes it 72 bytes:
 //!
 //! | offset | type | what |
 //! |---|---|---|
 //! | 24 | 3 × f32 | `tip_mm` |
 //! | 36 | 4 × f32 | `orientation_xyzw` |
 //! | 52 | 3 × f32 | `force_mn` |
+//! | 64 | f64 | with flag 2: `time_s` |
 //!
 //! An answer with `n` nodes, 116 + 28 `n` bytes; flag 1: the expected error was measured on requests like this one, flag 2: there are warnings
 //! (a session in `json` has their words), flag 4: the patch is cut from a mesh and brings its triangles:
@@ -43,7 +45,8 @@
 //! | 92 | f32 | expected error of the worst node, median; NaN where unknown |
 //! | 96 | f32 | the same, 95 %; NaN where unknown |
 //! | 100 | u32 | effects simulated: bit k is the k-th name of `GET /v1/about` |
-//! | 104 | 3 × u32 | 0, reserved |
+//! | 104 | f64 | `time_s` of the pose in a session with memory, else 0 |
+//! | 112 | u32 | 0, reserved |
 //! | 116 | 3 `n` × f32 | `vertices_mm` |
 //! | 116 + 12 `n` | 3 `n` × f32 | `normals` |
 //! | 116 + 24 `n` | `n` × f32 | `displacement_um` |
@@ -65,9 +68,12 @@ const MAGIC: [u8; 4] = *b"RTNA";
 const POSE: u8 = 1;
 const ANSWER: u8 = 2;
 const POSE_BYTES: usize = 64;
+const TIME_BYTES: usize = 8;
 const ANSWER_BYTES: usize = 116;
 const BYTES_PER_NODE: usize = 28;
 const FORCE_GIVEN: u16 = 1;
+const TIME_GIVEN: u16 = 2;
+const NEEDLE_STAYS: u16 = 4;
 const CALIBRATED: u16 = 1;
 const WARNED: u16 = 2;
 const CUT: u16 = 4;
@@ -79,6 +85,8 @@ pub struct Head {
     pub sequence: u64,
     /// The client's number.
     pub client_time_us: Option<f64>,
+    /// The pose's time in a session with memory (s).
+    pub time_s: Option<f64>,
     /// Poses overtaken since the last answer.
     pub dropped: u32,
     /// The server's times.
@@ -97,8 +105,11 @@ fn refused(what: &str, given: impl Into<serde_json::Value>, allowed: impl Into<S
 /// # Errors
 /// [`Kind::InvalidRequest`] naming the part of the layout that is not kept.
 pub fn pose(bytes: &[u8]) -> Result<StreamPose, Problem> {
-    let message: &[u8; POSE_BYTES] =
-        bytes.try_into().map_err(|_| refused("length", bytes.len(), format!("{POSE_BYTES} bytes")))?;
+    let lengths = || {
+        let allowed = format!("{POSE_BYTES} bytes, {TIME_BYTES} more with a time (flag {TIME_GIVEN})");
+        refused("length", bytes.len(), allowed)
+    };
+    let (message, rest) = bytes.split_first_chunk::<POSE_BYTES>().ok_or_else(lengths)?;
     if message[..4] != MAGIC {
         return Err(refused("magic", json!(message[..4]), "RTNA"));
     }
@@ -109,9 +120,16 @@ pub fn pose(bytes: &[u8]) -> Result<StreamPose, Problem> {
         return Err(refused("kind", message[5], format!("{POSE} (a pose)")));
     }
     let flags = u16::from_le_bytes(part(message, 6));
-    if flags & !FORCE_GIVEN != 0 {
-        return Err(refused("flags", flags, "0 or 1"));
+    let all = FORCE_GIVEN | TIME_GIVEN | NEEDLE_STAYS;
+    if flags & !all != 0 {
+        return Err(refused("flags", flags, format!("0 to {all}")));
     }
+    let time_s = match (flags & TIME_GIVEN != 0, rest) {
+        (false, []) => None,
+        (true, rest) => Some(f64::from_le_bytes(rest.try_into().map_err(|_| lengths())?)),
+        (false, _) => return Err(lengths()),
+    };
+    let given = flags & NEEDLE_STAYS == 0;
     let number = |at: usize| f64::from(f32::from_le_bytes(part(message, at)));
     let vector = |at: usize| [number(at), number(at + 4), number(at + 8)];
     let [x, y, z] = vector(36);
@@ -119,8 +137,9 @@ pub fn pose(bytes: &[u8]) -> Result<StreamPose, Problem> {
     let pose = StreamPose {
         sequence: u64::from_le_bytes(part(message, 8)),
         client_time_us: Some(time_us),
-        tip_mm: Vector(vector(24)),
-        orientation_xyzw: Some(Quaternion([x, y, z, number(48)])),
+        time_s,
+        tip_mm: given.then(|| Vector(vector(24))),
+        orientation_xyzw: given.then(|| Quaternion([x, y, z, number(48)])),
         direction: None,
         force_mn: (flags & FORCE_GIVEN != 0).then(|| Vector(vector(52))),
     };
@@ -129,7 +148,8 @@ pub fn pose(bytes: &[u8]) -> Result<StreamPose, Problem> {
         None => Ok(()),
     };
     finite("client_time_us", &[time_us])?;
-    finite("tip_mm", &pose.tip_mm.0)?;
+    finite("time_s", &[time_s.unwrap_or_default()])?;
+    finite("tip_mm", &vector(24))?;
     finite("orientation_xyzw", &[x, y, z, number(48)])?;
     finite("force_mn", &vector(52))?;
     Ok(pose)
@@ -188,7 +208,8 @@ pub fn answer(head: &Head, prediction: &Prediction) -> Result<Vec<u8>, Problem> 
         message.bytes.extend_from_slice(&if known { um as f32 } else { f32::NAN }.to_le_bytes());
     }
     message.whole(effects(prediction));
-    (0..3).for_each(|_| message.whole(0));
+    message.bytes.extend_from_slice(&head.time_s.unwrap_or(0.0).to_le_bytes());
+    message.whole(0);
     prediction.vertices.iter().for_each(|vertex| message.numbers(vertex.coords.as_slice()));
     prediction.normals.iter().for_each(|normal| message.numbers(normal.as_slice()));
     message.numbers(&prediction.displacement_um);

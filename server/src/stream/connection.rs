@@ -15,7 +15,6 @@ use tokio::time::{interval_at, timeout};
 
 use super::protocol::{Farewell, Form, Opening, Protocol, Taken};
 use super::session::{Posed, Session, open};
-use crate::admission;
 use crate::problem::{Kind, Problem};
 use crate::state::AppState;
 use crate::stopwatch::Stopwatch;
@@ -67,6 +66,8 @@ struct Connection<P: Protocol, T: Transport<P>> {
     heard: Instant,
     session: Option<Arc<Session<FormOf<P>>>>,
     opening: Option<Opening<FormOf<P>>>,
+    /// When that was asked for.
+    asked: Instant,
     newest: Option<PosedOf<P>>,
     last_sequence: Option<u64>,
     dropped: u32,
@@ -85,6 +86,7 @@ pub async fn serve<P: Protocol, T: Transport<P>>(transport: T, mut protocol: P, 
         heard: now,
         session: None,
         opening: protocol.begin(),
+        asked: now,
         newest: None,
         last_sequence: None,
         dropped: 0,
@@ -156,7 +158,7 @@ impl<P: Protocol, T: Transport<P>> Connection<P, T> {
             return;
         }
         if let Some(opening) = self.opening.take() {
-            self.work = Some(open_on(self.app.clone(), opening));
+            self.work = Some(open_on(self.app.clone(), opening, self.asked));
         } else if let Some(posed) = self.newest.take() {
             let dropped = std::mem::take(&mut self.dropped);
             match &self.session {
@@ -190,7 +192,7 @@ impl<P: Protocol, T: Transport<P>> Connection<P, T> {
             Taken::Open(opening) => {
                 // What the session before had not yet answered has no answer.
                 (self.session, self.newest, self.last_sequence, self.dropped) = (None, None, None, 0);
-                self.opening = Some(opening);
+                (self.opening, self.asked) = (Some(opening), self.heard);
             }
             Taken::Pose(pose, tag) => self.take_pose(pose, tag),
             Taken::Say(message) => self.remarks.push_back(message),
@@ -252,10 +254,13 @@ async fn sent<S>(outbox: &mut Outbox<S>) -> Result<S, ()> {
     }
 }
 
-fn open_on<F: Form>(app: AppState, opening: Opening<F>) -> Work<F> {
+fn open_on<F: Form>(app: AppState, opening: Opening<F>, asked: Instant) -> Work<F> {
     Box::pin(async move {
-        let scenes = Arc::clone(&app.scenes);
-        let job = move |_: &mut _, _: &dyn Fn() -> bool| open(opening, &scenes);
+        let (scenes, memories, limit) = (Arc::clone(&app.scenes), app.streams.memories.clone(), app.time_limit);
+        let job = move |_: &mut _, abandoned: &dyn Fn() -> bool| {
+            let mut stopwatch = Stopwatch::start(asked, limit, abandoned);
+            open(opening, (&scenes, &memories), asked, &mut stopwatch)
+        };
         let opened = app.pool.run(app.usual_ticket(), job).await;
         Done::Opened(opened.unwrap_or_else(|error| Err(error.into())))
     })
@@ -264,7 +269,7 @@ fn open_on<F: Form>(app: AppState, opening: Opening<F>) -> Work<F> {
 fn answer_on<F: Form>(app: AppState, session: Arc<Session<F>>, posed: Posed<F::Tag>, dropped: u32) -> Work<F> {
     Box::pin(async move {
         let (times, metrics, asked) = (Arc::clone(&app.times), Arc::clone(&app.metrics), posed.clone());
-        let (limit, ticket) = (app.time_limit, admission::of_budget(session.budget(), &times, app.longest_wait));
+        let (limit, ticket) = (app.time_limit, session.ticket(&times, app.longest_wait));
         let job = move |workspace: &mut _, abandoned: &dyn Fn() -> bool| {
             let mut stopwatch = Stopwatch::start(asked.arrived, limit, abandoned);
             session.answer(&asked, dropped, (&times, &metrics), workspace, &mut stopwatch)

@@ -4,7 +4,7 @@ use retina_core::predict::Prediction;
 
 use super::binary::Head;
 use crate::problem::Problem;
-use crate::wire::stream::{OpenSpec, StreamPose};
+use crate::wire::stream::{MemoryOpened, OpenSpec, StreamPose};
 
 /// Reads what opens a session, on a numerical thread: it may be long.
 pub type Opening<F> = Box<dyn FnOnce() -> Result<(OpenSpec, F), Problem> + Send>;
@@ -16,11 +16,11 @@ pub trait Form: Send + Sync + Sized + 'static {
     /// What a pose brings that its answer repeats, beside its number and time.
     type Tag: Clone + Send + 'static;
 
-    /// The session has begun, its surfaces all with these triangles; none for a mesh.
+    /// The session has begun, its surfaces all with these triangles, none for a mesh; with what was planned where it has memory.
     ///
     /// # Errors
     /// The problem that the client is told of.
-    fn opened(&self, spec: &OpenSpec, triangles: &[[usize; 3]]) -> Result<Self::Message, Problem>;
+    fn opened(&self, triangles: &[[usize; 3]], memory: Option<MemoryOpened>) -> Result<Self::Message, Problem>;
 
     /// The answer to a pose.
     ///

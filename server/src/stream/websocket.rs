@@ -8,7 +8,8 @@ use super::protocol::{Farewell, Form, Opening, Protocol, Taken};
 use crate::problem::{Kind, Problem};
 use crate::read::read;
 use crate::wire::stream::{
-    AnswerMessage, Format, OpenSpec, OpenedMessage, ProblemMessage, StreamCommand, StreamMessage, StreamPose,
+    AnswerMessage, Format, MemoryOpened, OpenSpec, OpenedMessage, ProblemMessage, StreamCommand, StreamMessage,
+    StreamPose,
 };
 use crate::write::{Layout, write};
 
@@ -25,8 +26,8 @@ impl Form for Format {
     type Message = Message;
     type Tag = ();
 
-    fn opened(&self, _spec: &OpenSpec, triangles: &[[usize; 3]]) -> Result<Message, Problem> {
-        text(&StreamMessage::Opened(OpenedMessage { protocol: binary::VERSION, format: *self, triangles }))
+    fn opened(&self, triangles: &[[usize; 3]], memory: Option<MemoryOpened>) -> Result<Message, Problem> {
+        text(&StreamMessage::Opened(OpenedMessage { protocol: binary::VERSION, format: *self, triangles, memory }))
     }
 
     fn answer(&self, head: &Head, _tag: &(), prediction: &Prediction) -> Result<Message, Problem> {
@@ -34,6 +35,7 @@ impl Form for Format {
             Format::Json => text(&StreamMessage::Answer(Box::new(AnswerMessage {
                 sequence: head.sequence,
                 client_time_us: head.client_time_us,
+                time_s: head.time_s,
                 dropped: head.dropped,
                 time_us: head.times,
                 prediction: prediction.into(),

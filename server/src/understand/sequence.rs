@@ -12,32 +12,34 @@ use crate::wire::SimulateRequest;
 use crate::wire::request::AccuracySpec;
 use crate::wire::sequence::StepSpec;
 
+/// Where a sequence has its steps.
+const STEPS: &str = "steps";
+
 /// The core's sequence with at most `most_steps` steps; the scene is looked up apart, see [`crate::scenes`].
 ///
 /// # Errors
 /// A problem that names the field.
 pub fn sequence(request: &SimulateRequest, most_steps: usize) -> Result<Sequence, Problem> {
-    let count = request.steps.len();
-    if count == 0 || count > most_steps {
-        let detail = format!("there are {count} steps; one simulation may have 1 to {most_steps}");
-        return Err(Problem::field(
-            Kind::OutOfRange,
-            "steps",
-            Some(json!(count)),
-            format!("1 to {most_steps}"),
-            detail,
-        ));
-    }
+    let steps = steps(STEPS, &request.steps, most_steps)?;
     Ok(Sequence {
         needle: needle::needle(&request.needle)?,
-        steps: request.steps.iter().enumerate().map(step).collect::<Result<_, _>>()?,
+        steps,
         level: level(request.accuracy.as_ref())?,
         effects: effects(request.effects.as_ref(), &Budget::default())?,
     })
 }
 
-fn step((index, spec): (usize, &StepSpec)) -> Result<Step, Problem> {
-    let path = format!("steps[{index}]");
+/// The core's steps of the list at `path`, at most so many.
+pub(super) fn steps(path: &str, list: &[StepSpec], most: usize) -> Result<Vec<Step>, Problem> {
+    let count = list.len();
+    if count == 0 || count > most {
+        let detail = format!("{path} has {count} steps, and may have 1 to {most}");
+        return Err(Problem::field(Kind::OutOfRange, path, Some(json!(count)), format!("1 to {most}"), detail));
+    }
+    list.iter().enumerate().map(|(index, spec)| step(format!("{path}[{index}]"), spec)).collect()
+}
+
+fn step(path: String, spec: &StepSpec) -> Result<Step, Problem> {
     let force_mn: Option<Vector3<f64>> =
         spec.force_mn.map(|force_mn| force(&format!("{path}.force_mn"), force_mn)).transpose()?;
     Ok(Step {
@@ -49,7 +51,7 @@ fn step((index, spec): (usize, &StepSpec)) -> Result<Step, Problem> {
 }
 
 /// The level of all steps: what a sequence computes is one motion, so its steps cannot choose for themselves.
-fn level(accuracy: Option<&AccuracySpec>) -> Result<Level, Problem> {
+pub(super) fn level(accuracy: Option<&AccuracySpec>) -> Result<Level, Problem> {
     let budget = budget(accuracy)?;
     if budget.promises() {
         let detail = "a sequence is computed at one level, so accuracy takes a level and no promise";

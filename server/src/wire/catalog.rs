@@ -157,6 +157,8 @@ pub struct AboutLimits {
     pub batch_poses: usize,
     /// Streams at once.
     pub streams: usize,
+    /// Sessions with memory at once.
+    pub stream_memories: usize,
     /// How long a stream's client may be silent, ms.
     pub stream_idle_ms: u64,
     /// Longest message of a stream, bytes.

@@ -10,6 +10,8 @@ use super::fixed::{Quaternion, Triangle, Vector};
 use super::object;
 use super::pose::PoseAnswer;
 use super::request::{AccuracySpec, EffectsSpec, SceneChoice, TipSpec};
+use super::response::EffectAnswer;
+use super::sequence::StepSpec;
 use crate::problem::ProblemDocument;
 
 /// A message of the client: exactly one of the fields.
@@ -37,12 +39,24 @@ pub struct OpenSpec {
     /// How accurate, and at what cost; level `coarse` when left out.
     #[serde(default, deserialize_with = "object::optional")]
     pub accuracy: Option<AccuracySpec>,
-    /// Which effects to simulate, as in a prediction. Those that remember (`viscoelasticity`, `inertia`) are refused: a stream has no
-    /// future to plan for, `POST /v1/simulate` has.
+    /// Which effects to simulate, as in a prediction. Those of time (`viscoelasticity`, `inertia`) need `memory`.
     pub effects: Option<EffectsSpec>,
+    /// Makes every pose the next step of one motion, with what the tissue remembers of those before. Left out: each is answered as if it were the first.
+    #[serde(default, deserialize_with = "object::optional")]
+    pub memory: Option<MemorySpec>,
     /// Form of the answers; `json` when left out.
     #[serde(default)]
     pub format: Format,
+}
+
+/// What a session that remembers is planned from, since it does not know the next pose.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MemorySpec {
+    /// Steps that span what the session will do: the deepest press, the farthest reach, the fastest change. They are planned like those of
+    /// `POST /v1/simulate` (which effects, one mesh around all contacts) and not simulated. The first has a `tip_mm`: there the needle is at time 0.
+    #[serde(deserialize_with = "object::list")]
+    pub rehearsal: Vec<StepSpec>,
 }
 
 /// A needle without its place.
@@ -76,11 +90,14 @@ pub struct StreamPose {
     pub sequence: u64,
     /// The client's clock, µs, or any other number that the answer is to repeat.
     pub client_time_us: Option<f64>,
-    /// Foremost point of the needle before it moves, scene frame, mm.
-    pub tip_mm: Vector,
+    /// In a session with memory: when the load of this pose is reached, s after the tissue was at rest, 1e-6 to 1000 after the last pose answered; the time since
+    /// the session was asked for when left out. Not in a session without memory.
+    pub time_s: Option<f64>,
+    /// Foremost point of the needle before it moves, scene frame, mm. Only in a session with memory it may be left out: the needle is where the last pose left it.
+    pub tip_mm: Option<Vector>,
     /// Rotation from the needle's frame to the scene's, as x, y, z, w. Not together with `direction`.
     pub orientation_xyzw: Option<Quaternion>,
-    /// The way the needle points, scene frame; `[0, 0, -1]` when neither this nor `orientation_xyzw` is given.
+    /// The way the needle points, scene frame. When neither this nor `orientation_xyzw` is given: `[0, 0, -1]`, and in a session with memory as the last pose left it.
     pub direction: Option<Vector>,
     /// Force along which the needle advances until the tissue's reaction along it equals it, scene frame, mN. Left out: the needle stays
     /// where it is, and the reaction is the answer.
@@ -109,6 +126,18 @@ pub struct OpenedMessage<'a> {
     /// Triangles between the nodes of every surface, counter-clockwise seen from the vitreous; empty for a mesh, whose answers bring their own.
     #[schema(value_type = Vec<Triangle>)]
     pub triangles: &'a [[usize; 3]],
+    /// What was planned, in a session with memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory: Option<MemoryOpened<'a>>,
+}
+
+/// What holds for all poses of a session with memory.
+#[derive(Serialize, ToSchema)]
+pub struct MemoryOpened<'a> {
+    /// The level that answers.
+    pub level: &'static str,
+    /// Every effect, simulated or not, and why.
+    pub effects: Vec<EffectAnswer<'a>>,
 }
 
 /// The answer to a pose.
@@ -119,6 +148,9 @@ pub struct AnswerMessage<'a> {
     /// The client's number, as it was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub client_time_us: Option<f64>,
+    /// The pose's time, in a session with memory, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
     /// Poses since the last answer that were overtaken by a newer one and have none.
     pub dropped: u32,
     /// The server's times.

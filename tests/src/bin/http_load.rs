@@ -2,7 +2,8 @@
 //! [-- LEVEL CONNECTIONS SECONDS TURNS RATE]` (`network`, 8, 2, 5, 2000). On loopback, the service in this process as the program runs it.
 //!
 //! Two turns in turns: clients that ask again as soon as they are answered, which fill the machine and say how many answers there are; and RATE requests a
-//! second on a schedule, which say how long an answer takes, counted from the scheduled time.
+//! second on a schedule, which say how long an answer takes, counted from the scheduled time. Beside these, in the same turns, an empty server that sends an answer of
+//! the same length at once: what the clients, the sockets and the system take by themselves; and what other programs and the hypervisor took of the machine.
 //!
 //! With `RETINA_PEERS_PYTHON` set to a Python that has `tests/comparison/fastapi/requirements.txt`, a FastAPI server around the paper's network is asked the same
 //! in turns with the service, so that what else runs on the machine meets both, and the ratio is printed.
@@ -14,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 use retina_core::comparison::quantile;
-use retina_tests::http_load::{Client, Measured, Pace, measure, post};
+use retina_tests::http_load::{Client, Measured, Pace, measure, post, start_empty};
 use retina_tests::local_service;
 use retina_tests::paper_network::displacement_um;
 use serde_json::{Value, json};
@@ -41,7 +42,9 @@ fn main() {
     let turn = Duration::from_secs_f64(argument(3, "2").parse::<f64>().expect("SECONDS").clamp(0.1, MOST.1));
     let turns = argument(4, "5").parse::<usize>().expect("TURNS").clamp(1, MOST.2);
     let rate = argument(5, "2000").parse::<f64>().expect("RATE").clamp(1.0, MOST_A_SECOND);
+    let began = Instant::now();
     let ours = local_service::start(&[]).expect("service");
+    println!("ready {:.2} s after the start", began.elapsed().as_secs_f64());
     let theirs = std::env::var("RETINA_PEERS_PYTHON").ok().map(|python| FastApi::start(&python));
     if let Some(theirs) = &theirs {
         let apart_um = apart_um(theirs.address);
@@ -62,10 +65,12 @@ fn main() {
     let ask = |address: SocketAddr, pace: Pace| {
         measure(address, &requests(address), connections, turn, pace).expect("answers")
     };
-    let (mut mine, mut scheduled, mut other) = (Vec::new(), Vec::new(), Vec::new());
+    let empty = start_empty(&answer_to(ours, &bodies[0])).expect("empty server");
+    let (mut mine, mut scheduled, mut floor, mut other) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for _ in 0..turns {
         mine.push(ask(ours, Pace::Answered));
         scheduled.push(ask(ours, Pace::Scheduled(rate)));
+        floor.push(ask(empty, Pace::Scheduled(rate)));
         other.extend(theirs.as_ref().map(|theirs| ask(theirs.address, Pace::Answered)));
     }
     println!("{level}, {connections} connections, {turns} turns of {} s, medians over the turns", turn.as_secs_f64());
@@ -80,6 +85,8 @@ fn main() {
             cpu_us: of(|m| m.cpu_us),
             p50_ms: of(|m| m.p50_ms),
             p99_ms: of(|m| m.p99_ms),
+            others_share: of(|m| m.others_share),
+            stolen_share: of(|m| m.stolen_share),
         };
         let Measured { per_second, p50_ms, p99_ms, .. } = measured;
         println!("{name}: {per_second:.0} answers a second; ms: p50 {p50_ms:.3}, p99 {p99_ms:.3}");
@@ -94,6 +101,13 @@ fn main() {
     let kept = scheduled.p50_ms <= goal_p50_ms && scheduled.p99_ms <= goal_p99_ms;
     println!("p50 of {goal_p50_ms} ms and p99 of {goal_p99_ms} ms or less, from the scheduled time: {}", word(kept));
     println!("processor time of an answer, service and clients together: {:.0} µs", scheduled.cpu_us);
+    println!(
+        "of the machine's time meanwhile: {:.1} % other programs, {:.1} % the hypervisor",
+        100.0 * scheduled.others_share,
+        100.0 * scheduled.stolen_share
+    );
+    let floor = told("an empty server on the same schedule", &floor);
+    println!("processor time of an answer, empty server and clients together: {:.0} µs", floor.cpu_us);
     if !other.is_empty() {
         told("FastAPI", &other);
         let mut ratios: Vec<f64> =
@@ -109,14 +123,19 @@ fn main() {
     }
 }
 
+/// The body of the answer to one request.
+fn answer_to(address: SocketAddr, body: &str) -> Vec<u8> {
+    let mut text = Vec::new();
+    let mut client = Client::connect(address).expect("connection");
+    let status = client.ask(&post(address, "/v1/predict", body), &mut text).expect("answer");
+    assert_eq!(status, 200, "{}", String::from_utf8_lossy(&text));
+    text
+}
+
 /// How far the server's answer to one request is from that of the same network in core, at the worst node (µm).
 fn apart_um(address: SocketAddr) -> f64 {
     let body = json!({"needle": {"tip_mm": [0.12, -0.05, 0.0]}, "force_mn": [0.0, 0.1, -0.8]}).to_string();
-    let mut text = Vec::new();
-    let mut client = Client::connect(address).expect("connection");
-    let status = client.ask(&post(address, "/v1/predict", &body), &mut text).expect("answer");
-    assert_eq!(status, 200, "{}", String::from_utf8_lossy(&text));
-    let answer: Value = serde_json::from_slice(&text).expect("JSON");
+    let answer: Value = serde_json::from_slice(&answer_to(address, &body)).expect("JSON");
     let told: Vec<f64> = serde_json::from_value(answer["surface"]["displacement_um"].clone()).expect("numbers");
     let core = displacement_um(0.12, -0.05, Vector3::new(0.0, 0.1, -0.8));
     assert_eq!(told.len(), core.len());

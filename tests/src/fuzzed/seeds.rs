@@ -97,7 +97,10 @@ fn stream() -> Vec<Vec<u8>> {
     let pose = crate::stream_client::encode_pose(7, 1.5, [0.1, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], Some([0.0, 0.0, -0.1]));
     let open = json!({"open": {"scene": "macula", "needle": {"gauge": "25G"}, "accuracy": {"level": "linear"}, "format": "binary"}});
     let told = json!({"pose": {"sequence": 1, "client_time_us": 1.5, "tip_mm": [0, 0, 0], "force_mn": [0, 0, -0.1]}});
-    vec![pose, text(&open), text(&told)]
+    let step = json!({"time_s": 0.1, "tip_mm": [0, 0, -0.05], "direction": [0, 0, -1]});
+    let memory = json!({"open": {"accuracy": {"level": "coarse"}, "memory": {"rehearsal": [step, step]}}});
+    let timed = crate::stream_client::at_time(pose.clone(), 0.2);
+    vec![pose, timed, text(&open), text(&told), text(&memory)]
 }
 
 fn weights(network: &str) -> Vec<u8> {

@@ -8,7 +8,8 @@ from typing import List, Optional, Sequence, Tuple
 
 _HEADER = struct.Struct("<4sBBHQd")
 _POSE = struct.Struct("<3f4f3f")
-_ANSWER = struct.Struct("<IBBHdff3ff3fffffffI3I")
+_ANSWER = struct.Struct("<IBBHdff3ff3fffffffIdI")
+_FORCE_GIVEN, _TIME_GIVEN, _NEEDLE_STAYS = 1, 2, 4
 _LEVELS = ("linear", "coarse", "reference", "network", "corrected")
 _CONTACTS = ("clear", "touching", "slipping", "punctured")
 
@@ -35,6 +36,7 @@ class Surface:
     max_pressure_kpa: float
     max_penetration_um: float
     expected_error_um: Tuple[float, ...]  # median and 95 %; NaN where unknown
+    time_s: float  # of the pose in a session with memory, else 0
     vertices_mm: List[Tuple[float, ...]]
     normals: List[Tuple[float, ...]]
     displacement_um: Tuple[float, ...]
@@ -45,15 +47,19 @@ class Surface:
 def write_pose(
     sequence: int,
     client_time_us: float,
-    tip_mm: Sequence[float],
+    tip_mm: Optional[Sequence[float]],
     orientation_xyzw: Sequence[float],
     force_mn: Optional[Sequence[float]],
+    time_s: Optional[float],
 ) -> bytes:
     """The binary message of a pose."""
-    flags = 0 if force_mn is None else 1
-    force = (0.0, 0.0, 0.0) if force_mn is None else force_mn
+    flags = (0 if force_mn is None else _FORCE_GIVEN) | (0 if time_s is None else _TIME_GIVEN)
+    flags |= _NEEDLE_STAYS if tip_mm is None else 0
+    tip, turned = ((0.0,) * 3, (0.0,) * 4) if tip_mm is None else (tip_mm, orientation_xyzw)
+    force = (0.0,) * 3 if force_mn is None else force_mn
     header = _HEADER.pack(b"RTNA", 1, 1, flags, sequence, client_time_us)
-    return header + _POSE.pack(*tip_mm, *orientation_xyzw, *force)
+    time = b"" if time_s is None else struct.pack("<d", time_s)
+    return header + _POSE.pack(*tip, *turned, *force) + time
 
 
 def read_surface(message: bytes) -> Surface:
@@ -92,6 +98,7 @@ def read_surface(message: bytes) -> Surface:
         max_pressure_kpa=f[16],
         max_penetration_um=f[17],
         expected_error_um=f[18:20],
+        time_s=f[21],
         vertices_mm=triples[:count],
         normals=triples[count:],
         displacement_um=numbers[6 * count :],

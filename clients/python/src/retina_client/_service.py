@@ -57,7 +57,7 @@ class Service:
             connection.close()
 
     def stream(self, session: Optional[OpenSpec] = None) -> Stream:
-        """`GET /v1/stream`, opened with `scene`, `needle`, `accuracy`, `effects`."""
+        """`GET /v1/stream`, opened with `scene`, `needle`, `accuracy`, `effects`, `memory`."""
         return Stream(self._host, self._port, self._headers, self._timeout_s, session or {})
 
     def scenes(self) -> SceneList:

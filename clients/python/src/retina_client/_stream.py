@@ -12,7 +12,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from ._binary import Surface, read_surface, write_pose
 from ._problem import Problem, StreamClosed
-from .messages import OpenSpec, Triangle
+from .messages import MemoryOpened, OpenSpec, Triangle
 
 _TEXT, _BINARY, _CLOSE, _PING, _PONG = 1, 2, 8, 9, 10
 
@@ -32,6 +32,7 @@ class Stream:
             self.close()
             raise Problem.of(opened["problem"]["problem"])
         self.triangles: List[Triangle] = opened["opened"]["triangles"]
+        self.memory: Optional[MemoryOpened] = opened["opened"].get("memory")
 
     def __enter__(self) -> "Stream":
         return self
@@ -50,14 +51,20 @@ class Stream:
 
     def send(
         self,
-        tip_mm: Sequence[float],
+        tip_mm: Optional[Sequence[float]],
         force_mn: Optional[Sequence[float]] = None,
         orientation_xyzw: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
         client_time_us: float = 0.0,
+        time_s: Optional[float] = None,
     ) -> int:
-        """Sends a pose and returns its number. Without a force the needle is held where it is."""
+        """Sends a pose and returns its number. Without a force the needle is held where it is.
+
+        In a session with memory a pose has a time (the server's clock where it is left out), and without a tip the needle is
+        where the last pose left it.
+        """
         self._sequence += 1
-        self._frame(_BINARY, write_pose(self._sequence, client_time_us, tip_mm, orientation_xyzw, force_mn))
+        pose = write_pose(self._sequence, client_time_us, tip_mm, orientation_xyzw, force_mn, time_s)
+        self._frame(_BINARY, pose)
         return self._sequence
 
     def receive(self) -> Surface:
@@ -67,7 +74,7 @@ class Stream:
             raise Problem.of(json.loads(message)["problem"]["problem"])
         return read_surface(message)
 
-    def ask(self, tip_mm: Sequence[float], force_mn: Optional[Sequence[float]] = None, **more: Any) -> Surface:
+    def ask(self, tip_mm: Optional[Sequence[float]], force_mn: Optional[Sequence[float]] = None, **more: Any) -> Surface:
         """Sends a pose and waits for its answer."""
         self.send(tip_mm, force_mn, **more)
         return self.receive()

@@ -41,6 +41,8 @@ class _AboutLimitsRequired(TypedDict):
     """How long a simulation or a batch may take, ms."""
     stream_idle_ms: int
     """How long a stream's client may be silent, ms."""
+    stream_memories: int
+    """Sessions with memory at once."""
     stream_message_bytes: int
     """Longest message of a stream, bytes."""
     streams: int
@@ -100,6 +102,8 @@ class AnswerMessage(_AnswerMessageRequired, total=False):
     """The answer to a pose."""
     client_time_us: Optional[float]
     """The client's number, as it was given."""
+    time_s: Optional[float]
+    """The pose's time, in a session with memory, s."""
 
 
 class BatchAnswerPrediction(TypedDict):
@@ -427,6 +431,23 @@ class LevelList(TypedDict):
     """The levels, cheapest first."""
 
 
+class MemoryOpened(TypedDict):
+    """What holds for all poses of a session with memory."""
+    effects: List["EffectAnswer"]
+    """Every effect, simulated or not, and why."""
+    level: str
+    """The level that answers."""
+
+
+class MemorySpec(TypedDict):
+    """What a session that remembers is planned from, since it does not know the next pose."""
+    rehearsal: List["StepSpec"]
+    """Steps that span what the session will do: the deepest press, the farthest reach, the fastest change. They are
+    planned like those of `POST /v1/simulate` (which effects, one mesh around all contacts) and not simulated. The
+    first has a `tip_mm`: there the needle is at time 0.
+    """
+
+
 class _NeedleAnswerRequired(TypedDict):
     reaction_mn: "Vector"
     """Force of the tissue on the needle, scene frame, mN."""
@@ -467,12 +488,12 @@ class OpenSpec(TypedDict, total=False):
     effects: Optional["EffectsSpec"]
     format: "Format"
     """Form of the answers; `json` when left out."""
+    memory: Optional["MemorySpec"]
     needle: Optional["ShapeSpec"]
     scene: Optional["SceneChoice"]
 
 
-class OpenedMessage(TypedDict):
-    """The session has begun."""
+class _OpenedMessageRequired(TypedDict):
     format: "Format"
     """Form of the answers."""
     protocol: int
@@ -481,6 +502,11 @@ class OpenedMessage(TypedDict):
     """Triangles between the nodes of every surface, counter-clockwise seen from the vitreous; empty for a mesh,
     whose answers bring their own.
     """
+
+
+class OpenedMessage(_OpenedMessageRequired, total=False):
+    """The session has begun."""
+    memory: Optional["MemoryOpened"]
 
 
 class ParameterEntry(TypedDict):
@@ -920,8 +946,6 @@ StreamMessage = Union["StreamMessageOpened", "StreamMessageAnswer", "StreamMessa
 class _StreamPoseRequired(TypedDict):
     sequence: int
     """Number of the pose, larger than that of the one before; the answer repeats it."""
-    tip_mm: "Vector"
-    """Foremost point of the needle before it moves, scene frame, mm."""
 
 
 class StreamPose(_StreamPoseRequired, total=False):
@@ -931,6 +955,12 @@ class StreamPose(_StreamPoseRequired, total=False):
     direction: Optional["Vector"]
     force_mn: Optional["Vector"]
     orientation_xyzw: Optional["Quaternion"]
+    time_s: Optional[float]
+    """In a session with memory: when the load of this pose is reached, s after the tissue was at rest, 1e-6 to 1000
+    after the last pose answered; the time since the session was asked for when left out. Not in a session without
+    memory.
+    """
+    tip_mm: Optional["Vector"]
 
 
 class StreamTimes(TypedDict):
