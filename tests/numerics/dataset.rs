@@ -14,7 +14,7 @@ use retina_core::predict::{Control, EffectChoice, Level, PreparedScene, Request,
 use retina_core::progress::Silent;
 use retina_models::dataset::DatasetError;
 use retina_models::dataset::deformcontact::{ContactSample, export, import};
-use retina_models::dataset::draw::{Depths, LIGHT_SHARE, PathPlan, STEPS, plan};
+use retina_models::dataset::draw::{Depths, LIGHT_SHARE, PathPlan, STEPS, Tips, plan};
 use retina_models::dataset::manifest::Manifest;
 use retina_models::dataset::part::Part;
 use retina_models::dataset::path::before_limit_point;
@@ -116,6 +116,11 @@ fn another_seed_is_refused_and_gives_other_data() {
     let other = Order { seed: 6, ..order(8, 2) };
     let error = generate(&other, &place, &ProgressBar::hidden()).unwrap_err();
     assert!(matches!(error, DatasetError::OtherSettings { field: "seed", .. }), "{error}");
+    let (light, edged) = (Order { depths: Depths::Light, ..order(8, 2) }, Order { tips: Tips::Edged, ..order(8, 2) });
+    for (otherwise, setting) in [(light, "depths"), (edged, "tips")] {
+        let error = generate(&otherwise, &place, &ProgressBar::hidden()).unwrap_err();
+        assert!(matches!(error, DatasetError::OtherSettings { field, .. } if field == setting), "{error}");
+    }
     let another = folder("other-seed");
     run(&other, &another);
     assert_ne!(samples(&place), samples(&another));
@@ -162,8 +167,9 @@ fn samples_obey_the_laws_of_their_equilibrium() {
 
 #[test]
 fn pushed_with_the_force_of_a_step_the_needle_stops_at_its_travel() {
-    let plan = (0..)
-        .find_map(|path| plan(5, path, &[1], Depths::Deep).filter(|plan| plan.needle.shape.tip == Tip::Hemispherical));
+    let plan = (0..).find_map(|path| {
+        plan(5, path, &[1], Depths::Deep, Tips::All).filter(|plan| plan.needle.shape.tip == Tip::Hemispherical)
+    });
     let plan = plan.unwrap();
     let scene = PreparedScene::new(plan.scene.clone()).unwrap();
     let mut held = Indentation::new(&scene, plan.needle, plan.direction, TRUTH).unwrap();
@@ -209,14 +215,17 @@ fn a_path_ends_where_it_takes_no_more_force() {
 fn paths_belong_to_one_split_and_splits_to_their_ranges() {
     let mut counts = BTreeMap::new();
     for path in 0..3000 {
-        let light = plan(1, path, &[0, 1, 2], Depths::Light).unwrap();
-        let plan = plan(1, path, &[0, 1, 2], Depths::Deep).unwrap();
+        let light = plan(1, path, &[0, 1, 2], Depths::Light, Tips::All).unwrap();
+        let edged = plan(1, path, &[0, 1, 2], Depths::Deep, Tips::Edged).unwrap();
+        assert!(edged.needle.shape.tip != Tip::Hemispherical);
+        let plan = plan(1, path, &[0, 1, 2], Depths::Deep, Tips::All).unwrap();
         *counts.entry(plan.split).or_insert(0) += 1;
         plan.scene.validate().unwrap();
         plan.needle.validate().unwrap();
         let tilt = 180.0 - plan.needle.direction().z.acos().to_degrees();
         assert!(plan.depth_shares.is_sorted() && plan.depth_shares[STEPS - 1] <= 1.0);
         // The same path otherwise.
+        assert!(edged.scene == plan.scene && edged.needle.shape.radius_mm == plan.needle.shape.radius_mm);
         assert!(light.needle == plan.needle && light.scene == plan.scene);
         assert!(light.depth_shares.is_sorted() && light.depth_shares[STEPS - 1] < plan.depth_shares[STEPS - 1]);
         assert!(light.depth_shares[0] >= LIGHT_SHARE[0] * (1.0 - 1e-9));

@@ -14,7 +14,7 @@ use retina_core::predict::indentation::EFFECTS;
 use retina_core::predict::{Control, EffectChoice, Level, PredictError, PreparedScene, Request, Workspace};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
-use retina_models::dataset::draw::{Depths, plan};
+use retina_models::dataset::draw::{Depths, Tips, plan};
 use retina_models::evaluate::report::TIPS;
 use retina_models::sample::Sample;
 use serde::{Deserialize, Serialize};
@@ -49,7 +49,7 @@ pub type Errors = BTreeMap<String, GroupErrors>;
 /// The question whose answer a sample holds; `None` for a sample that its seed does not lead to.
 pub fn question(sample: &Sample) -> Option<(Scene, Request)> {
     let scenes: Vec<u8> = (0..Scene::built_in_names().len() as u8).collect();
-    let plan = plan(SEED, sample.path, &scenes, Depths::Deep)?;
+    let plan = plan(SEED, sample.path, &scenes, Depths::Deep, Tips::All)?;
     let request = Request {
         needle: plan.needle,
         control: Control::Force(plan.direction.into_inner() * f64::from(sample.force_mn)),

@@ -8,7 +8,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 
 use crate::dataset::DatasetError;
-use crate::dataset::draw::Depths;
+use crate::dataset::draw::{Depths, Tips};
 use crate::dataset::manifest::Manifest;
 use crate::dataset::part::Part;
 use crate::dataset::report::report;
@@ -28,6 +28,9 @@ pub struct Arguments {
     /// How deep they go.
     #[arg(long, value_enum, default_value_t = Depths::Deep)]
     depths: Depths,
+    /// Which tips they have.
+    #[arg(long, value_enum, default_value_t = Tips::All)]
+    tips: Tips,
     /// Seed: the same seed gives the same data, whatever the number of threads.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -56,8 +59,8 @@ pub struct ReportArguments {
 /// [`DatasetError`].
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let order =
-        Order { depths: arguments.depths, ..Order::new(&arguments.scene, arguments.paths, arguments.seed, threads) };
+    let Arguments { depths, tips, paths, seed, .. } = *arguments;
+    let order = Order { depths, tips, ..Order::new(&arguments.scene, paths, seed, threads) };
     let start = Instant::now();
     if let Some(part) = arguments.part {
         let (computed, new_samples) = generate_part(&order, part, &arguments.out, &ProgressBar::new(0))?;

@@ -63,6 +63,17 @@ pub enum Depths {
     Light,
 }
 
+/// Which tips the paths have.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Tips {
+    /// All of them, by [`TIP_SHARES`].
+    #[default]
+    All,
+    /// Flat ends and bevels, in the proportion that they have there: what is hardest to learn and rarest among all.
+    Edged,
+}
+
 /// Largest part of the distance to the step before by which a step's depth is drawn back.
 pub const JITTER: f64 = 0.5;
 /// Poses drawn before a path is given up: one that leans too far off the surface or touches beyond [`REACH_MM`] is drawn again.
@@ -102,10 +113,11 @@ fn random(seed: u64, path: u32) -> fastrand::Rng {
 struct Draw {
     random: fastrand::Rng,
     split: Split,
+    tips: Tips,
 }
 
 /// The plan of path number `path` from `seed`, on one of the built-in scenes that `scenes` names by index. `None` if no pose was found.
-pub fn plan(seed: u64, path: u32, scenes: &[u8], depths: Depths) -> Option<PathPlan> {
+pub fn plan(seed: u64, path: u32, scenes: &[u8], depths: Depths, tips: Tips) -> Option<PathPlan> {
     let mut random = random(seed, path);
     let mut left = random.f64();
     let drawn = SPLIT_SHARES.iter().position(|share| {
@@ -113,7 +125,7 @@ pub fn plan(seed: u64, path: u32, scenes: &[u8], depths: Depths) -> Option<PathP
         left < 0.0
     });
     let split = Split::ALL[drawn.unwrap_or(0)];
-    let mut draw = Draw { random, split };
+    let mut draw = Draw { random, split, tips };
     let scene_index = scenes[draw.random.usize(..scenes.len())];
     let name = Scene::built_in_names()[usize::from(scene_index)];
     let mut scene = Scene::built_in(name)?;
@@ -173,7 +185,10 @@ impl Draw {
         let radii = if beyond { [gauges[1], OUTSIDE_RADIUS_MM] } else { gauges };
         // The root makes thick needles more frequent: thin ones puncture before they move much.
         let radius_mm = radii[0] + (radii[1] - radii[0]) * self.random.f64().sqrt();
-        let kind = self.random.f64();
+        let kind = match self.tips {
+            Tips::All => self.random.f64(),
+            Tips::Edged => TIP_SHARES[0] + (1.0 - TIP_SHARES[0]) * self.random.f64(),
+        };
         let default = self.random.f64() < DEFAULT_TIP_SHARE;
         let (edge, angle) = (self.between(EDGE_SHARE) * radius_mm, self.between(BEVEL_DEG));
         let mut shape = match kind {

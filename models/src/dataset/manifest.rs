@@ -15,7 +15,7 @@ use retina_core::tissue::ranges::{CHOROID, LayerRanges, RETINA, SCLERA};
 use serde::{Deserialize, Serialize};
 
 use super::blocks::{PathRecord, read_json, write_json};
-use super::draw::Depths;
+use super::draw::{Depths, Tips};
 use super::error::DatasetError;
 use super::shards::ShardRecord;
 use super::{draw, path, truth};
@@ -42,6 +42,9 @@ pub struct Settings {
     /// How deep the paths go.
     #[serde(default)]
     pub depths: Depths,
+    /// Which tips the needles have.
+    #[serde(default)]
+    pub tips: Tips,
 }
 
 /// Paths by how they ended.
@@ -98,7 +101,7 @@ pub struct Manifest {
 
 impl Settings {
     /// Settings of this program for `seed` and the scenes with these indices.
-    pub fn new(seed: u64, scenes: &[u8], depths: Depths) -> Self {
+    pub fn new(seed: u64, scenes: &[u8], depths: Depths, tips: Tips) -> Self {
         let names = Scene::built_in_names();
         Settings {
             format: FORMAT,
@@ -107,6 +110,7 @@ impl Settings {
             truth: truth::NAME.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             depths,
+            tips,
         }
     }
 
@@ -124,6 +128,8 @@ impl Settings {
                 ("scenes", settings.scenes.join(", ")),
                 ("truth", settings.truth.clone()),
                 ("version", settings.version.clone()),
+                ("depths", format!("{:?}", settings.depths)),
+                ("tips", format!("{:?}", settings.tips)),
             ]
         };
         for ((field, found), (_, wanted)) in of(&found).into_iter().zip(of(self)) {

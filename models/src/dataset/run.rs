@@ -13,7 +13,7 @@ use retina_core::predict::finite_element::Resolution;
 use retina_core::scene::Scene;
 
 use super::blocks::{BlockRecord, Blocks, PATHS_PER_BLOCK};
-use super::draw::{Depths, plan};
+use super::draw::{Depths, Tips, plan};
 use super::error::DatasetError;
 use super::manifest::{Counts, FILE, Manifest, Settings};
 use super::part::Part;
@@ -35,6 +35,8 @@ pub struct Order {
     pub paths: u32,
     /// How deep they go.
     pub depths: Depths,
+    /// Which tips they have.
+    pub tips: Tips,
     /// The seed.
     pub seed: u64,
     /// Threads.
@@ -46,7 +48,15 @@ pub struct Order {
 impl Order {
     /// `paths` deep paths on `scene` from `seed` with `threads` threads.
     pub fn new(scene: &str, paths: u32, seed: u64, threads: usize) -> Self {
-        Order { scene: scene.to_owned(), paths, depths: Depths::Deep, seed, threads, resolution: truth::TRUTH }
+        Order {
+            scene: scene.to_owned(),
+            paths,
+            depths: Depths::Deep,
+            tips: Tips::All,
+            seed,
+            threads,
+            resolution: truth::TRUTH,
+        }
     }
 
     /// Indices of the scenes among the built-in names.
@@ -177,7 +187,7 @@ fn begin(order: &Order, folder: &FilePath) -> Result<(Vec<u8>, Settings, Blocks)
         }
     }
     std::fs::create_dir_all(folder).map_err(DatasetError::io(folder))?;
-    let settings = Settings::new(order.seed, &scenes, order.depths);
+    let settings = Settings::new(order.seed, &scenes, order.depths, order.tips);
     settings.check(folder)?;
     let manifest = folder.join(FILE);
     if !manifest.exists() {
@@ -253,7 +263,7 @@ impl<'a> Work<'a> {
 
     fn path(&self, path: u32, memory: &mut PathMemory) -> Result<PathOutcome, DatasetError> {
         let none = |cause| PathOutcome { samples: Vec::new(), ended_by: Some(cause), iterations: 0 };
-        let Some(plan) = plan(self.order.seed, path, self.scenes, self.order.depths) else {
+        let Some(plan) = plan(self.order.seed, path, self.scenes, self.order.depths, self.order.tips) else {
             return Ok(none(Cause::NoStart));
         };
         let own;

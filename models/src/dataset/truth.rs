@@ -8,7 +8,7 @@ use retina_core::equilibrium::ContactSettings;
 use retina_core::predict::finite_element::{REFERENCE, Resolution};
 use retina_core::predict::{PredictError, PreparedScene};
 
-use super::draw::{Depths, STEPS, plan};
+use super::draw::{Depths, STEPS, Tips, plan};
 use super::path::{Path, PathMemory};
 use super::report::largest_um;
 use crate::sample::Sample;
@@ -75,7 +75,7 @@ pub struct Comparison {
 /// If the path's scene cannot be prepared.
 pub fn compare(seed: u64, path: u32, scenes: &[u8]) -> Result<Vec<Comparison>, PredictError> {
     let mut comparisons = Vec::new();
-    let Some(plan) = plan(seed, path, scenes, Depths::Deep) else { return Ok(comparisons) };
+    let Some(plan) = plan(seed, path, scenes, Depths::Deep, Tips::All) else { return Ok(comparisons) };
     let prepared = PreparedScene::new(plan.scene.clone())?;
     let tip = plan.needle.shape.tip.kind();
     let meshes = [TRUTH, FINER].map(|mesh| Path::new(&plan, &prepared, mesh));
