@@ -8,3 +8,4 @@ pub mod globalization;
 mod held;
 pub mod newton;
 pub mod sparse;
+mod step;

@@ -18,12 +18,11 @@ use std::ops::AddAssign;
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use super::border::Bordered;
 pub use super::border::Drive;
 use super::condensed::Condensed;
 pub use super::globalization::Globalization;
 use super::globalization::{Step, Trial};
-use super::held::{Border, Held};
+use super::held::Held;
 use super::sparse::{Factor, LinearSolveError, SymbolicFactor, norm};
 use crate::assemble::{Dofs, Pattern, Scratch, energy, gradient};
 use crate::effect::Term;
@@ -323,78 +322,6 @@ impl System<'_> {
         self.change_multiplier(-change);
         report.residual_mn = self.residual(positions, drive, workspace);
         Ok(false)
-    }
-
-    /// The Newton step (free unknowns, the border, and the change of the multiplier where there is one), the travel limited, and the slope of the potential along it.
-    fn step(
-        &self,
-        drive: Drive,
-        max_travel_mm: f64,
-        workspace: &mut Workspace,
-    ) -> Result<(Vec<f64>, f64), NewtonError> {
-        let free = self.dofs.free;
-        let directions: Vec<Vector3<f64>> = drive.directions().into_iter().map(|(direction, _)| direction).collect();
-        let out_of_balance = drive.out_of_balance(&Vector3::from_row_slice(&workspace.residual[free..]));
-        let border = &workspace.values[self.pattern.stored()..];
-        let couplings: Vec<f64> = directions
-            .iter()
-            .flat_map(|direction| (0..free).map(|i| (0..3).map(|k| border[k * free + i] * direction[k]).sum::<f64>()))
-            .collect();
-        let mut columns: Vec<f64> = workspace.residual[..free].iter().map(|r| -r).collect();
-        let mut changes = Vec::new();
-        if workspace.held.slope.is_empty() {
-            self.respond(drive, &couplings, &mut columns, workspace);
-        } else {
-            columns.extend_from_slice(&couplings);
-            columns.extend_from_slice(&workspace.held.slope);
-            workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut columns)?;
-            let (bent, response) = columns.split_at_mut((1 + directions.len()) * free);
-            let border = Border::new(&workspace.held, response);
-            let missing = workspace.held.missing;
-            let columns = bent.chunks_exact_mut(free).enumerate();
-            changes.extend(columns.map(|(index, column)| border.bend(column, if index == 0 { missing } else { 0.0 })));
-        }
-        let bordered = Bordered {
-            directions: &directions,
-            couplings: &couplings,
-            columns: &columns[..(1 + directions.len()) * free],
-            out_of_balance: &out_of_balance,
-        };
-        let corner = &workspace.values[self.pattern.stored() + 3 * free..];
-        let (mut step, travels) = bordered.step(|row, column| corner[3 * row + column], max_travel_mm);
-        if changes.is_empty() {
-            let mut forces: Vec<f64> = workspace.residual[..free].iter().map(|r| -r).collect();
-            for (travel, coupling) in travels.iter().zip(couplings.chunks_exact(free)) {
-                forces.iter_mut().zip(coupling).for_each(|(force, coupling)| *force -= travel * coupling);
-            }
-            workspace.factor.check(self.symbolic, self.pattern, &workspace.values, &mut step[..free], &forces)?;
-        }
-        let residual = &workspace.residual;
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-        let mut slope = dot(&step[..free], &residual[..free]) + dot(&travels, &out_of_balance);
-        if let [alone, with_travel @ ..] = &changes[..] {
-            let change = alone - dot(&travels, with_travel);
-            slope -= change * workspace.held.missing;
-            step.push(change);
-        }
-        Ok((step, slope.min(0.0)))
-    }
-
-    /// Solves for the forces in `columns` and puts the answers to the `couplings` behind them, which the factor at hand gives once for each drive.
-    fn respond(&self, drive: Drive, couplings: &[f64], columns: &mut Vec<f64>, workspace: &mut Workspace) {
-        let forces = columns.len();
-        match workspace.responses.take_if(|(of, _)| *of == drive) {
-            Some(at_hand) => {
-                workspace.factor.substitute(self.symbolic, self.pattern, columns);
-                columns.extend_from_slice(&at_hand.1);
-                workspace.responses = Some(at_hand);
-            }
-            None => {
-                columns.extend_from_slice(couplings);
-                workspace.factor.substitute(self.symbolic, self.pattern, columns);
-                workspace.responses = Some((drive, columns[forces..].to_vec()));
-            }
-        }
     }
 
     fn bad_start(&self, positions: &[f64], scratch: &mut Scratch) -> NewtonError {
