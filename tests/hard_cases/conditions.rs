@@ -39,7 +39,7 @@ const CASES: &[Case] = &[
         "µ 2, 74° off the normal: pressure and friction hand the force to and fro",
         || rough(2.0),
         || lean(ball(), 30.0, 74.0, 0.1),
-        Answer(74),
+        Answer(76),
     ),
     case("µ 0.2, 74° off the normal", || rough(0.2), || lean(ball(), 30.0, 74.0, 0.1), Answer(26)),
     case("µ 2, flat tip on its edge", || rough(2.0), || lean(NeedleShape::flat(0.257), 30.0, 30.0, 0.3), Answer(11)),

@@ -5,6 +5,7 @@
 //!
 //! Not here: values (`verification`), errors (`accuracy`).
 
+mod auto;
 mod bleb;
 mod effects;
 mod equilibrium;

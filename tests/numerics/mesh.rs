@@ -324,12 +324,12 @@ fn samples_lie_where_they_were_asked_for() {
         let [x, y] = geometry.parameters[point];
         parameters[3 * vertex..3 * vertex + 3].copy_from_slice(&[x, y, 1.0]);
     }
-    let mut random = noise(53);
+    let (surface, mut random) = (SurfaceLocator::new(&topology, &geometry), noise(53));
     let (mut inside, mut outside) = (0, 0);
     while inside < 300 {
         let at = [center[0] + 1.2 * rim * random(), center[1] + 1.2 * rim * random()];
         let distance = (at[0] - center[0]).hypot(at[1] - center[1]);
-        match SurfaceLocator::new(&topology, &geometry).locate(at) {
+        match surface.locate(at) {
             Some(sample) => {
                 // Quadratic edges stray from the rim's circle by less than a percent.
                 assert!(distance < 1.01 * rim);
@@ -347,8 +347,7 @@ fn samples_lie_where_they_were_asked_for() {
     assert!(outside > 20);
     // At a node of the surface, the node alone.
     for &vertex in &topology.face_points[0] {
-        let sample =
-            SurfaceLocator::new(&topology, &geometry).locate(geometry.parameters[topology.vertices[vertex].0]).unwrap();
+        let sample = surface.locate(geometry.parameters[topology.vertices[vertex].0]).unwrap();
         let weight: f64 = sample.weights.iter().filter(|(v, _)| *v == vertex).map(|(_, w)| w).sum();
         assert!((weight - 1.0).abs() < 1e-9);
     }

@@ -49,6 +49,8 @@ pub struct NewtonSettings {
 const CHORD_BELOW: f64 = 0.1;
 /// A chord step must bring the residual down to this share: what is far from linear is left to a new factor.
 const CHORD_REDUCTION: f64 = 0.5;
+/// Residual over that of a chord step which did not, below which another one is tried.
+const CHORDS_AGAIN: f64 = 0.1;
 /// Chord steps that may still be needed, at the rate at which the last one brought the residual down: as many cost about what an iteration does.
 const MOST_CHORDS_LEFT: f64 = 5.0;
 
@@ -218,6 +220,7 @@ impl System<'_> {
     ) -> Result<NewtonReport, NewtonError> {
         let mut report = NewtonReport::default();
         let mut weakenings = 0;
+        let mut chords_below_mn = CHORD_BELOW * settings.force_scale_mn;
         let mut trial = Trial::new(self, positions, drive, settings, workspace);
         report.residual_mn = self.residual(positions, drive, workspace);
         if !report.residual_mn.is_finite() {
@@ -261,10 +264,16 @@ impl System<'_> {
             let (halvings, residual_mn) = taken.ok_or(stuck)?;
             report.halvings += halvings;
             report.residual_mn = residual_mn;
-            while report.residual_mn > settings.tolerance_mn
-                && report.residual_mn < CHORD_BELOW * settings.force_scale_mn
-                && self.chord(positions, drive, settings, &mut report, workspace)?
-            {}
+            while report.residual_mn > settings.tolerance_mn && report.residual_mn < chords_below_mn {
+                let before_mn = report.residual_mn;
+                let pays = self.chord(positions, drive, settings, &mut report, workspace)?;
+                if report.residual_mn >= before_mn {
+                    chords_below_mn = CHORDS_AGAIN * before_mn;
+                }
+                if !pays {
+                    break;
+                }
+            }
         }
         Ok(report)
     }
