@@ -10,6 +10,9 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+/// Component pairs (row, column) of the blocks of a local Hessian that hold its lower triangle.
+pub(crate) const LOWER_BLOCKS: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+
 /// One group of vertices, as an effect sees it. All slices have length 3 × vertices of the group, component-major.
 #[derive(Clone, Copy, Debug)]
 pub struct Local<'a> {
@@ -156,4 +159,16 @@ pub struct Term<'a> {
     pub stencils: &'a Stencils,
     /// Which of the sets that the pattern was made for these stencils are: several effects may share one.
     pub set: usize,
+}
+
+/// Adds the same matrix between like components to a local Hessian.
+pub(crate) fn add_isotropic<const N: usize>(matrix: &[[f64; N]; N], out: &mut [f64]) {
+    for k in 0..3 {
+        for (a, row) in matrix.iter().enumerate() {
+            let at = (k * N + a) * 3 * N + k * N;
+            for (out, entry) in out[at..at + N].iter_mut().zip(row) {
+                *out += entry;
+            }
+        }
+    }
 }

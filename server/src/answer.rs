@@ -42,8 +42,7 @@ pub fn answer(
     stopwatch: &mut Stopwatch,
 ) -> Result<Answer, Problem> {
     let message: PredictRequest = read(body)?;
-    let request = understand::request(&message)?;
-    let budget = understand::budget(message.accuracy.as_ref())?;
+    let (request, budget) = understand::request(&message)?;
     stopwatch.stage("prepare");
     let scene = scenes.get(message.scene.as_ref())?;
     predict(&scene, Question { request, budget, times }, workspace, stopwatch, Layout::Compact)

@@ -254,8 +254,7 @@ fn read_input(path: &Path, input: &mut dyn Read) -> io::Result<Vec<u8>> {
 fn answer(body: &[u8], mesh: Option<&Path>, layout: Layout) -> Result<Vec<u8>, Problem> {
     let mut stopwatch = Stopwatch::start(Instant::now(), Duration::MAX / 4, &|| false);
     let message: PredictRequest = read(body)?;
-    let request = understand::request(&message)?;
-    let budget = understand::budget(message.accuracy.as_ref())?;
+    let (request, budget) = understand::request(&message)?;
     let mut scene = understand::chosen(message.scene.as_ref())?;
     if let Some(path) = mesh {
         replace_surface(&mut scene, path)?;

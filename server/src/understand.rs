@@ -64,19 +64,19 @@ pub const FORCE: ParameterRange = ParameterRange {
 /// How far the length of a quaternion may be from 1; it is then made 1.
 const QUATERNION_TOLERANCE: f64 = 1e-3;
 
-/// The core's request, its level that of one that asks for none; the scene is looked up apart, see [`crate::scenes`], and so is what the answer must
-/// keep, see [`budget`].
+/// The core's request, its level that of one that asks for none, and what the answer must keep; the scene is looked up apart, see [`crate::scenes`].
 ///
 /// # Errors
 /// A problem that names the field.
-pub fn request(request: &PredictRequest) -> Result<Request, Problem> {
+pub fn request(request: &PredictRequest) -> Result<(Request, Budget), Problem> {
     let budget = budget(request.accuracy.as_ref())?;
-    Ok(Request {
+    let request = Request {
         needle: needle::needle(&request.needle)?,
         control: control(request.control, request.force_mn)?,
         level: DEFAULT_LEVEL,
         effects: effects(request.effects.as_ref(), &budget)?,
-    })
+    };
+    Ok((request, budget))
 }
 
 /// What many poses share.

@@ -102,7 +102,7 @@ impl Friction<'_> {
 
     /// From a point's anchor to where it is (mm).
     fn offset(&self, local: &Local, rubbing: &RubbingPoint) -> Vector3<f64> {
-        let n = FACE_NODES + 1;
+        let n = GROUP;
         let mut offset = -rubbing.anchor;
         for k in 0..3 {
             let row = &local.current[k * n..(k + 1) * n];

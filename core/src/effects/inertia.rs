@@ -12,8 +12,8 @@
 //! Law: momentum changes only by forces; the kinetic energy that the scheme loses is ½ (v − vₙ)ᵀ M (v − vₙ) ≥ 0.
 //! Limits: the needle has no mass (its guide moves it); drag is that of a surface that moves alone, without a flow of its own.
 
-use crate::effect::{Effect, Local, Stencils};
-use crate::effects::contact::ContactFaces;
+use crate::effect::{Effect, Local, Stencils, add_isotropic};
+use crate::effects::contact::{ContactFaces, GROUP};
 use crate::effects::solid::SolidGeometry;
 use crate::mesh::element::{FACE_NODES, NODES, QUADRATURE};
 
@@ -160,9 +160,6 @@ pub struct VitreousDrag<'a> {
     pub step_s: f64,
 }
 
-/// Vertices of a face's group: its nodes and the needle.
-const GROUP: usize = FACE_NODES + 1;
-
 impl VitreousDrag<'_> {
     fn moved(&self, local: &Local) -> [f64; 3 * GROUP] {
         let mut moved = [0.0; 3 * GROUP];
@@ -220,17 +217,5 @@ impl Effect for VitreousDrag<'_> {
             }
         });
         add_isotropic(&drag, out);
-    }
-}
-
-/// Adds the same matrix between like components.
-fn add_isotropic<const N: usize>(matrix: &[[f64; N]; N], out: &mut [f64]) {
-    for k in 0..3 {
-        for (a, row) in matrix.iter().enumerate() {
-            let at = (k * N + a) * 3 * N + k * N;
-            for (out, entry) in out[at..at + N].iter_mut().zip(row) {
-                *out += entry;
-            }
-        }
     }
 }

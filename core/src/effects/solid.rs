@@ -99,6 +99,12 @@ impl SolidGeometry {
         &self.gradients[element * POINTS + point]
     }
 
+    /// The same of all points of an element: the x, y, z rows of the first point, then those of the next.
+    #[inline(always)]
+    pub(super) fn gradient_rows(&self, element: usize) -> &[[f64; NODES]] {
+        self.gradients[element * POINTS..(element + 1) * POINTS].as_flattened()
+    }
+
     /// Quadrature weights × rest Jacobian of one element (mm³).
     #[inline(always)]
     pub fn weights(&self, element: usize) -> &[f64] {

@@ -21,7 +21,7 @@ use super::solid::{
     Energy, Gradient, Hessian, MaxStep, SolidEnergy, SolidGeometry, StiffnessCoefficients, determinant_and_cofactor,
     push_forward, run_kernel,
 };
-use crate::effect::{Effect, Local, Stencils};
+use crate::effect::{Effect, Local, Stencils, add_isotropic};
 use crate::mesh::element::{NODES, POINTS};
 
 /// Name of the effect.
@@ -249,20 +249,14 @@ impl SolidEnergy for Viscoelasticity<'_> {
             coefficients[q].cross = scale * self.barrier;
         }
         self.geometry.add_stiffness(local.group, &spatial, &coefficients, None, out);
+        // In the order of the gradients: all components of a point, then the next.
+        let mut pulled_rows = [[0.0; NODES]; 3 * POINTS];
+        for (row, pulled_row) in pulled_rows.iter_mut().enumerate() {
+            *pulled_row = pulled[row % 3][row / 3];
+        }
         let mut isotropic = [[0.0; NODES]; NODES];
-        for q in 0..POINTS {
-            for (pulled, rest) in pulled.iter().zip(self.geometry.gradients(local.group, q)) {
-                add_products([(&pulled[q..=q], std::slice::from_ref(rest))], &mut isotropic);
-            }
-        }
-        let rows = out.as_chunks_mut::<NODES>().0;
-        for a in 0..NODES {
-            for i in 0..3 {
-                for b in 0..NODES {
-                    rows[(i * NODES + a) * 3 + i][b] += isotropic[a][b];
-                }
-            }
-        }
+        add_products([(&pulled_rows, self.geometry.gradient_rows(local.group))], &mut isotropic);
+        add_isotropic(&isotropic, out);
     }
 }
 

@@ -151,7 +151,7 @@ impl Factor {
         rhs: &mut [f64],
     ) -> Result<(), LinearSolveError> {
         let target = rhs.to_vec();
-        self.substitute(symbolic, pattern, rhs);
+        self.substitute(symbolic, rhs);
         for (x, b) in rhs.chunks_exact_mut(pattern.free).zip(target.chunks_exact(pattern.free)) {
             self.check(symbolic, pattern, values, x, b)?;
         }
@@ -159,9 +159,11 @@ impl Factor {
     }
 
     /// As [`Factor::solve`], unchecked: what is made of the solutions is to be checked.
-    pub(super) fn substitute(&mut self, symbolic: &SymbolicFactor, pattern: &Pattern, rhs: &mut [f64]) {
-        let columns = rhs.len() / pattern.free;
-        self.back_substitute(symbolic, rhs, pattern.free, columns);
+    pub(super) fn substitute(&mut self, symbolic: &SymbolicFactor, rhs: &mut [f64]) {
+        let n = symbolic.symbolic.nrows();
+        let factor = LltRef::new(&symbolic.symbolic, &self.values);
+        let rhs = MatMut::from_column_major_slice_mut(rhs, n, rhs.len() / n);
+        factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(&mut self.stack));
     }
 
     /// Checks that A x = b, with one step of refinement where it helps.
@@ -183,7 +185,7 @@ impl Factor {
         let mut relative = self.residual_into(pattern, values, x, b) / size;
         if relative > REFINE_ABOVE {
             let mut correction = std::mem::take(&mut self.residual);
-            self.back_substitute(symbolic, &mut correction, pattern.free, 1);
+            self.substitute(symbolic, &mut correction);
             for (x, c) in x.iter_mut().zip(&correction) {
                 *x += c;
             }
@@ -219,12 +221,6 @@ impl Factor {
             }
         }
         tail
-    }
-
-    fn back_substitute(&mut self, symbolic: &SymbolicFactor, rhs: &mut [f64], n: usize, columns: usize) {
-        let factor = LltRef::new(&symbolic.symbolic, &self.values);
-        let rhs = MatMut::from_column_major_slice_mut(rhs, n, columns);
-        factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(&mut self.stack));
     }
 
     /// Leaves b − A x in `self.residual` and returns its norm.

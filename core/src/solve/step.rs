@@ -69,13 +69,13 @@ impl System<'_> {
         let forces = columns.len();
         match workspace.responses.take_if(|(of, _)| *of == drive) {
             Some(at_hand) => {
-                workspace.factor.substitute(self.symbolic, self.pattern, columns);
+                workspace.factor.substitute(self.symbolic, columns);
                 columns.extend_from_slice(&at_hand.1);
                 workspace.responses = Some(at_hand);
             }
             None => {
                 columns.extend_from_slice(couplings);
-                workspace.factor.substitute(self.symbolic, self.pattern, columns);
+                workspace.factor.substitute(self.symbolic, columns);
                 workspace.responses = Some((drive, columns[forces..].to_vec()));
             }
         }

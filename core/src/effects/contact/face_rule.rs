@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Matrix3;
 
+use crate::effect::LOWER_BLOCKS;
 use crate::mesh::element::{FACE_NODES, TOP_NODES, gauss_rule, shapes};
 
 /// Vertices of a group: those of the face, then the needle.
@@ -16,9 +17,6 @@ pub const GROUP: usize = FACE_NODES + 1;
 
 /// Products of two weights, the second vertex not after the first, padded to whole vectors of four.
 const PAIRS: usize = (GROUP * (GROUP + 1) / 2).next_multiple_of(4);
-
-/// Component pairs (row, column) of the lower block triangle.
-const BLOCKS: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 /// Shape functions at the quadrature points of the reference face.
 #[derive(Debug)]
@@ -66,18 +64,18 @@ impl FaceRule {
 /// The Hessian of one face, summed over its points.
 pub struct FaceStiffness<'a> {
     rule: &'a FaceRule,
-    sums: [[f64; PAIRS]; BLOCKS.len()],
+    sums: [[f64; PAIRS]; LOWER_BLOCKS.len()],
 }
 
 impl<'a> FaceStiffness<'a> {
     pub(super) fn new(rule: &'a FaceRule) -> Self {
-        FaceStiffness { rule, sums: [[0.0; PAIRS]; BLOCKS.len()] }
+        FaceStiffness { rule, sums: [[0.0; PAIRS]; LOWER_BLOCKS.len()] }
     }
 
     /// Adds a point whose energy has the symmetric second derivative `stiffness` (mN/mm) by its offset from the needle.
     pub fn add(&mut self, point: usize, stiffness: &Matrix3<f64>) {
         let pairs = &self.rule.pairs[point];
-        for (sums, &(i, j)) in self.sums.iter_mut().zip(&BLOCKS) {
+        for (sums, &(i, j)) in self.sums.iter_mut().zip(&LOWER_BLOCKS) {
             let scale = stiffness[(i, j)];
             for (sum, pair) in sums.iter_mut().zip(pairs) {
                 *sum += scale * pair;
@@ -87,7 +85,7 @@ impl<'a> FaceStiffness<'a> {
 
     /// Adds the sum to the lower triangle of the group's matrix `out`.
     pub fn add_to(&self, out: &mut [f64]) {
-        for (sums, &(i, j)) in self.sums.iter().zip(&BLOCKS) {
+        for (sums, &(i, j)) in self.sums.iter().zip(&LOWER_BLOCKS) {
             let mut pairs = sums.iter();
             for a in 0..GROUP {
                 for (b, pair) in (0..=a).zip(&mut pairs) {

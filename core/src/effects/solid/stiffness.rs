@@ -6,13 +6,11 @@ use nalgebra::Matrix4;
 
 use super::SolidGeometry;
 use super::products::{add_products, add_symmetric_products, scaled_row};
+use crate::effect::LOWER_BLOCKS;
 use crate::mesh::element::{MODES, NODES, POINTS};
 
 /// One number per node for each component at each quadrature point: indexed (component, point, node).
 pub type PointRows = [[[f64; NODES]; POINTS]; 3];
-
-/// Component pairs (row, column) of the lower block triangle of an element matrix.
-const BLOCKS: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 /// The second derivative of an energy of the projected dilatation.
 pub struct Volumetric {
@@ -49,7 +47,7 @@ impl SolidGeometry {
     ) {
         let mut isotropic = [[0.0; NODES]; NODES];
         if coefficients.iter().any(|c| c.rest != 0.0) {
-            let rest = self.gradients[element * POINTS..(element + 1) * POINTS].as_flattened();
+            let rest = self.gradient_rows(element);
             let mut scaled = [[0.0; NODES]; 3 * POINTS];
             for (row, (scaled, rest)) in scaled.iter_mut().zip(rest).enumerate() {
                 *scaled = scaled_row(coefficients[row / 3].rest, rest);
@@ -76,7 +74,7 @@ impl SolidGeometry {
         let modes = if volumetric.is_some() { MODES } else { 0 };
         let outers = if has_outer { POINTS } else { 0 };
         let rows = out.as_chunks_mut::<NODES>().0;
-        for &(i, j) in &BLOCKS {
+        for &(i, j) in &LOWER_BLOCKS {
             let of_modes = (&scaled[i][..modes], &integrals[j][..modes]);
             let mut block = [[0.0; NODES]; NODES];
             if i == j {
