@@ -100,6 +100,13 @@ pub trait Effect: Send + Sync {
         1.0
     }
 
+    /// The effect with what in it is no gradient held as it is at `positions`, so that it has an energy; `None` where it has one anyway.
+    ///
+    /// Friction is such an effect: its limit is another's pressure. A solver may balance the held effect, hold it anew, and so on.
+    fn held_at<'a>(&'a self, _stencils: &Stencils, _positions: &[f64]) -> Option<Box<dyn Effect + 'a>> {
+        None
+    }
+
     /// The unknown of an effect that holds something at a value: its energy is then −multiplier × what it holds ([`Effect::held`]). At most one effect of a system has one.
     fn multiplier(&self) -> Option<&Multiplier> {
         None

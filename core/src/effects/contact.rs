@@ -149,6 +149,18 @@ impl Contact<'_> {
         })
     }
 
+    /// The points of a face that press, each with its force (mN) and the needle's outward normal in the frame of the positions.
+    pub fn pressing<'b>(&'b self, local: &'b Local) -> impl Iterator<Item = (usize, f64, Vector3<f64>)> + 'b {
+        let nodes = self.nodes_in_needle(local);
+        let points = self.faces.areas(local.group).iter().enumerate();
+        points.filter_map(move |(point, area)| {
+            let at = self.in_needle(&nodes, point);
+            let pressure_kpa = -self.penalty(self.shape.distance(&at)).1;
+            let normal = || (self.frame_from_needle * self.shape.signed_distance(&at).gradient).normalize();
+            (pressure_kpa > 0.0).then(|| (point, pressure_kpa * area, normal()))
+        })
+    }
+
     /// Calls `visit(point, its area, its signed distance)` for each point of the face in contact.
     fn for_each_touching(&self, local: &Local, mut visit: impl FnMut(usize, f64, SignedDistance)) {
         let nodes = self.nodes_in_needle(local);

@@ -10,10 +10,14 @@
 //! Energy per rest area: µ p̂ f₀(|g|), with f₀ the C² approximation of |g| of Li et al. (*Incremental Potential Contact*, ACM Trans. Graph. 2020, section
 //! 5.2; here of slip and not of velocity): f₀′(y) = f₁(y) = 2y/ε − y²/ε² for y < ε, 1 beyond. The pressure p̂ and the normal n̂ are those of an
 //! earlier equilibrium (lagged): Coulomb friction has no potential otherwise, and this one is convex. Equilibrium is found again with new p̂ and n̂ until they
-//! settle (`equilibrium::friction`).
+//! settle (`equilibrium::friction`); or the same traction is used with the pressure of each position (`coupled`), which has no potential but is nearer.
 //!
 //! Law: the traction lies in the needle's tangent plane, opposes the slip and is at most µ p̂; it reaches µ p̂ at the slip ε and beyond, so what sticks creeps by less than ε.
 //! Not here: the pressure (`contact`), the repetition.
+
+mod coupled;
+
+use std::borrow::Cow;
 
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
@@ -21,6 +25,7 @@ use super::contact::{ContactFaces, GROUP};
 use crate::effect::{Effect, Local};
 use crate::mesh::element::FACE_NODES;
 use crate::needle::Body;
+pub use coupled::CoupledFriction;
 
 /// Name of the effect.
 pub const NAME: &str = "friction";
@@ -43,7 +48,7 @@ pub struct Friction<'a> {
     /// The faces at rest.
     pub faces: &'a ContactFaces,
     /// The points that rub, face by face.
-    pub points: &'a [Vec<RubbingPoint>],
+    pub points: Cow<'a, [Vec<RubbingPoint>]>,
     /// Slip ε from which on friction is at its limit (mm).
     pub full_slip_mm: f64,
 }
@@ -93,7 +98,14 @@ const ANCHOR_TOLERANCE: f64 = 1e-12;
 /// Least cosine between motion and surface normal at which a point is met and not passed.
 const LEAST_CLOSING: f64 = 1e-3;
 
-impl Friction<'_> {
+/// The law at given points of one face.
+struct Law<'a> {
+    faces: &'a ContactFaces,
+    points: &'a [RubbingPoint],
+    full_slip_mm: f64,
+}
+
+impl Law<'_> {
     /// Slip of a point (mm).
     fn slip(&self, local: &Local, rubbing: &RubbingPoint) -> Vector3<f64> {
         let offset = self.offset(local, rubbing);
@@ -112,17 +124,6 @@ impl Friction<'_> {
         offset
     }
 
-    /// The anchor (from the tip, in the frame of the positions, mm) that a point has after this slip: the old one while it sticks; what slips drags it behind
-    /// itself at the distance `AT_REST` ε, where friction is short of its limit by one part in ten thousand, so that a needle that stops meets tissue that sticks.
-    pub fn dragged(&self, local: &Local, rubbing: &RubbingPoint) -> Vector3<f64> {
-        let slip = self.slip(local, rubbing);
-        let y = slip.norm();
-        if y < self.full_slip_mm {
-            return rubbing.anchor;
-        }
-        rubbing.anchor + self.offset(local, rubbing) - slip * (AT_REST * self.full_slip_mm / y)
-    }
-
     /// f₀, f₁(y)/y and f₁′ (mm, 1/mm, 1/mm) at the slip y (mm).
     fn smoothed(&self, y: f64) -> (f64, f64, f64) {
         let e = self.full_slip_mm;
@@ -133,21 +134,67 @@ impl Friction<'_> {
         }
     }
 
-    /// Whether each rubbing point of a face slips, with the share of its friction that is used (1 where it slips).
-    pub fn used<'b>(&'b self, local: &'b Local) -> impl Iterator<Item = (RubbingPoint, f64)> + 'b {
-        self.points[local.group].iter().map(move |rubbing| {
-            let y = self.slip(local, rubbing).norm();
-            (*rubbing, if y >= self.full_slip_mm { 1.0 } else { self.smoothed(y).1 * y })
-        })
+    fn energy(&self, local: &Local) -> f64 {
+        let energy = |r: &RubbingPoint| r.limit_mn * self.smoothed(self.slip(local, r).norm()).0;
+        self.points.iter().map(energy).sum()
     }
 
-    /// Calls `visit(rubbing point, slip, f₁(y)/y, f₁′)` for every rubbing point of a face.
+    fn add_force(&self, local: &Local, out: &mut [f64]) {
+        self.for_each(local, |rubbing, slip, over, _| {
+            let force = slip * (over * rubbing.limit_mn);
+            for (k, out) in out.as_chunks_mut::<GROUP>().0.iter_mut().enumerate() {
+                for (out, weight) in out.iter_mut().zip(self.faces.weights(rubbing.point)) {
+                    *out += weight * force[k];
+                }
+            }
+        });
+    }
+
+    fn add_stiffness(&self, local: &Local, out: &mut [f64]) {
+        let mut stiffness = self.faces.stiffness();
+        self.for_each(local, |rubbing, slip, over, slope| {
+            let along = slip.try_normalize(0.0).unwrap_or_default();
+            let tangent = Matrix3::identity() - rubbing.normal * rubbing.normal.transpose();
+            let of_point = tangent * over + along * along.transpose() * (slope - over);
+            stiffness.add(rubbing.point, &(of_point * rubbing.limit_mn));
+        });
+        stiffness.add_to(out);
+    }
+
+    /// Calls `visit(rubbing point, slip, f₁(y)/y, f₁′)` for every rubbing point.
     fn for_each(&self, local: &Local, mut visit: impl FnMut(&RubbingPoint, Vector3<f64>, f64, f64)) {
-        for rubbing in &self.points[local.group] {
+        for rubbing in self.points {
             let slip = self.slip(local, rubbing);
             let (_, over, slope) = self.smoothed(slip.norm());
             visit(rubbing, slip, over, slope);
         }
+    }
+}
+
+impl Friction<'_> {
+    fn law(&self, local: &Local) -> Law<'_> {
+        Law { faces: self.faces, points: &self.points[local.group], full_slip_mm: self.full_slip_mm }
+    }
+
+    /// The anchor (from the tip, in the frame of the positions, mm) that a point has after this slip: the old one while it sticks; what slips drags it behind
+    /// itself at the distance `AT_REST` ε, where friction is short of its limit by one part in ten thousand, so that a needle that stops meets tissue that sticks.
+    pub fn dragged(&self, local: &Local, rubbing: &RubbingPoint) -> Vector3<f64> {
+        let law = self.law(local);
+        let slip = law.slip(local, rubbing);
+        let y = slip.norm();
+        if y < self.full_slip_mm {
+            return rubbing.anchor;
+        }
+        rubbing.anchor + law.offset(local, rubbing) - slip * (AT_REST * self.full_slip_mm / y)
+    }
+
+    /// Whether each rubbing point of a face slips, with the share of its friction that is used (1 where it slips).
+    pub fn used<'b>(&'b self, local: &'b Local) -> impl Iterator<Item = (RubbingPoint, f64)> + 'b {
+        self.points[local.group].iter().map(move |rubbing| {
+            let law = self.law(local);
+            let y = law.slip(local, rubbing).norm();
+            (*rubbing, if y >= self.full_slip_mm { 1.0 } else { law.smoothed(y).1 * y })
+        })
     }
 }
 
@@ -161,29 +208,14 @@ impl Effect for Friction<'_> {
     }
 
     fn energy(&self, local: &Local) -> f64 {
-        let energy = |r: &RubbingPoint| r.limit_mn * self.smoothed(self.slip(local, r).norm()).0;
-        self.points[local.group].iter().map(energy).sum()
+        self.law(local).energy(local)
     }
 
     fn add_gradient(&self, local: &Local, out: &mut [f64]) {
-        self.for_each(local, |rubbing, slip, over, _| {
-            let force = slip * (over * rubbing.limit_mn);
-            for (k, out) in out.as_chunks_mut::<GROUP>().0.iter_mut().enumerate() {
-                for (out, weight) in out.iter_mut().zip(self.faces.weights(rubbing.point)) {
-                    *out += weight * force[k];
-                }
-            }
-        });
+        self.law(local).add_force(local, out);
     }
 
     fn add_hessian(&self, local: &Local, out: &mut [f64]) {
-        let mut stiffness = self.faces.stiffness();
-        self.for_each(local, |rubbing, slip, over, slope| {
-            let along = slip.try_normalize(0.0).unwrap_or_default();
-            let tangent = Matrix3::identity() - rubbing.normal * rubbing.normal.transpose();
-            let of_point = tangent * over + along * along.transpose() * (slope - over);
-            stiffness.add(rubbing.point, &(of_point * rubbing.limit_mn));
-        });
-        stiffness.add_to(out);
+        self.law(local).add_stiffness(local, out);
     }
 }

@@ -96,6 +96,15 @@ pub(super) const REPETITIONS: [Attempt; 2] = [
         travel_share: ROUND_TRAVEL,
     },
 ];
+/// Friction coupled to the pressures, from a state nearby.
+pub(super) const COUPLED: Attempt = Attempt {
+    load_steps: 1,
+    globalization: Globalization::PredictedStress,
+    max_iterations: 7,
+    max_weakened: 3,
+    resumes: false,
+    travel_share: 1.0,
+};
 /// Iterations of all attempts together: what takes more is a sharp edge that cuts its way in, where no load path of this model ends.
 const MOST_ITERATIONS: usize = 120;
 /// Share of the remaining way by which the needle overlaps the tissue at the start of load steps.
@@ -115,6 +124,21 @@ impl Wall<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<Equilibrium, EquilibriumError> {
+        self.solve_to(self.contact.tolerance, load, positions, workspace, progress)
+    }
+
+    /// As [`Wall::solve`], to the residual `tolerance` relative to the force scale.
+    ///
+    /// # Errors
+    /// [`EquilibriumError`].
+    pub(super) fn solve_to(
+        &self,
+        tolerance: f64,
+        load: &Load,
+        positions: Vec<f64>,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Equilibrium, EquilibriumError> {
         let mut start = Some(positions);
         let mut spent = 0;
         let mut failure = EquilibriumError::Newton(NewtonError::Interrupted { iterations: 0 });
@@ -123,7 +147,7 @@ impl Wall<'_> {
                 break;
             }
             let positions = start.take().unwrap_or_else(|| self.touching(load));
-            match self.follow(load, attempt, positions, &mut spent, workspace, progress) {
+            match self.follow(load, (attempt, tolerance), positions, &mut spent, workspace, progress) {
                 Ok(mut equilibrium) => {
                     equilibrium.newton.iterations = spent;
                     return Ok(equilibrium);
@@ -152,7 +176,8 @@ impl Wall<'_> {
         progress: &mut dyn Progress,
     ) -> Result<Equilibrium, EquilibriumError> {
         let mut spent = 0;
-        let mut found = self.follow(load, &ATTEMPTS[0], positions, &mut spent, workspace, progress)?;
+        let direct = (&ATTEMPTS[0], self.contact.tolerance);
+        let mut found = self.follow(load, direct, positions, &mut spent, workspace, progress)?;
         found.newton.iterations = spent;
         Ok(found)
     }
@@ -166,11 +191,12 @@ impl Wall<'_> {
         positions
     }
 
-    /// Follows equal load steps to the whole motion, with a softened contact if there is one, and ends with the contact proper.
+    /// Follows equal load steps to the whole motion, with a softened contact if there is one, and ends with the contact proper, to a residual `tolerance` relative to the
+    /// force scale.
     fn follow(
         &self,
         load: &Load,
-        attempt: &Attempt,
+        (attempt, tolerance): (&Attempt, f64),
         mut positions: Vec<f64>,
         spent: &mut usize,
         workspace: &mut Workspace,
@@ -187,7 +213,7 @@ impl Wall<'_> {
             }
             let drive = self.drive(motion, share);
             let softly = (&softened, SOFTENED_TOLERANCE);
-            let proper = (&self.contact, self.contact.tolerance);
+            let proper = (&self.contact, tolerance);
             let softly = (self.contact.softening > 1.0).then_some(softly);
             let proper = (softly.is_none() || step == attempt.load_steps).then_some(proper);
             for (contact, tolerance) in softly.into_iter().chain(proper) {

@@ -1,49 +1,34 @@
-//! The repetition that friction needs: solve, take new contact pressures and normals, solve again, until they settle.
+//! Friction besides: an equilibrium whose friction has the pressures of that very equilibrium.
 //!
-//! It starts from the frictionless equilibrium, or after another motion from the equilibrium under the pressures that this one left. The pressures of the next round are a mix of those used and those found (Irons & Tuck 1969): where the
-//! force along the motion is shared between pressure and friction, each round answers the last one's error with one of the opposite sign, and plain repetition
-//! would diverge beyond µ tan(angle) = 1. The friction itself begins with a coefficient that rises and a wide stick zone that narrows from round to round, so that no solve has to find many points' way
-//! across it at once. A round begins with the stiffness that the one before left, factorised, and ends as near to equilibrium as the pressures are to rest.
+//! The limit of friction is a pressure that friction changes. First the two are found together ([`CoupledFriction`]): from where the tissue is near rest without friction, or from what the
+//! last motion left, Newton's method meets pressures and slip on the surface that is touched, as it does the contact (`solve::condensed`). Where that leads nowhere (a high friction on a steep flank, an
+//! edge that sticks and slips in turn), pressures are held from round to round until they settle (`rounds`).
 //! Not here: the energy (`effects::friction`), what is remembered of earlier motions (`grip`).
+
+mod rounds;
+
+use std::sync::OnceLock;
 
 use nalgebra::Vector3;
 
-use super::attempts::REPETITIONS;
+use super::attempts::COUPLED;
 use super::error::EquilibriumError;
 use super::grip::{Approach, Grip};
 use super::{Addition, Equilibrium, Load, Wall};
 use crate::effect::{Effect, Local};
-use crate::effects::friction::{Friction, RubbingPoint};
+use crate::effects::friction::{CoupledFriction, Friction, RubbingPoint};
 use crate::mesh::wall::Place;
 use crate::progress::Progress;
-use crate::solve::newton::{NewtonError, NewtonReport, Workspace};
+use crate::solve::newton::{NewtonError, Workspace};
 
 /// Slip from which on friction is at its limit (mm): what sticks creeps by less, a fraction of what the levels resolve.
 pub const FULL_SLIP_MM: f64 = 5e-4;
-/// Change of the pressures from one round to the next, relative to their sum, at which they count as settled. Friction is off by no more than
-/// this share.
-pub const SETTLED: f64 = 1e-3;
-/// Residual relative to the force scale at which a round stops, between these: no nearer to equilibrium than a share of what the pressures still change from round
-/// to round, for the next round moves it again (the forcing term of an inexact Newton method: Dembo, Eisenstat & Steihaug 1982). The last one goes on to that of
-/// every solve.
-const ROUND_TOLERANCE: (f64, f64) = (1e-3, 0.03);
-/// That share.
-const FORCING: f64 = 0.1;
-/// Rounds before friction counts as not settling.
-const MAX_ROUNDS: usize = 60;
-/// Largest rise of the coefficient from one round to the next: what is held at once by a high friction is held wherever it happens to be.
-const COEFFICIENT_STEP: f64 = 0.5;
-/// Factors on the largest share of the found pressures in the next mix after a round that changed more than the last, and after one that changed less: points
-/// of a sharp edge that touch and let go in turn come to rest.
-const CALMING: f64 = 0.5;
-/// See [`CALMING`].
-const HASTENING: f64 = 1.3;
-/// Stick zone of the first round over the last one's.
-const FIRST_WIDENING: f64 = 16.0;
-/// Factor by which the stick zone narrows from round to round.
-const NARROWING: f64 = 0.25;
-/// Bounds of the share of the found pressures in the next mix.
-const MIX: (f64, f64) = (0.05, 1.0);
+/// Residual relative to the force scale from which on friction joins: tissue so near to rest keeps the side of an edge on which it is, and what is left is moved by friction anyway.
+const JOINED_AT: f64 = 1.0;
+
+/// µ times the tangent of the angle between motion and normal up to which friction is coupled: holding the pressure anew leaves about this share of the error,
+/// and mixing what rounds find does better beyond.
+const COUPLED_UP_TO: f64 = 0.5;
 
 /// How the tissue rubs at an equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,8 +37,6 @@ pub struct Rubbing {
     pub slipping_share: f64,
     /// Force of friction on the needle (mN).
     pub force_mn: Vector3<f64>,
-    /// Rounds until the pressures settled.
-    pub rounds: usize,
 }
 
 /// The state of the contact that friction is made from, for each quadrature point of each face.
@@ -71,6 +54,13 @@ impl Pressed {
         let changes = self.forces_mn.iter().zip(&earlier.forces_mn).map(|(now, before)| (now - before).abs());
         let (change, sum): (f64, f64) = (changes.sum(), self.forces_mn.iter().sum());
         if change > 0.0 { change / sum } else { 0.0 }
+    }
+
+    /// Tangent of the angle between the motion and the force on the needle; 0 where nothing presses.
+    fn steepness(&self, load: &Load) -> f64 {
+        let force: Vector3<f64> = self.normals.iter().zip(&self.forces_mn).map(|(normal, force)| normal * *force).sum();
+        let along = load.motion.direction.dot(&force);
+        if force == Vector3::zeros() { 0.0 } else { load.motion.direction.cross(&force).norm() / along.abs() }
     }
 }
 
@@ -107,71 +97,68 @@ impl Wall<'_> {
         let before =
             grip.holds().then(|| self.solve_as_before(load, coefficient, grip, &positions, workspace, progress));
         let is_warm = matches!(before, Some(Ok(_)));
-        let (mut found, lost) = match before {
-            Some(Ok(found)) => (found, 0),
+        let mut lost = 0;
+        let near = match before {
+            Some(Ok(near)) => near,
             Some(Err(stop)) if stop.is_interrupted() => return Err(stop),
-            Some(Err(failure)) => (self.solve(load, positions, workspace, progress)?, failure.iterations()),
-            None => (self.solve(load, positions, workspace, progress)?, 0),
+            other => {
+                lost = other.and_then(Result::err).map_or(0, |failure| failure.iterations());
+                self.solve_to(JOINED_AT, load, positions, workspace, progress)?
+            }
         };
-        let mut total = found.newton;
-        total.iterations += lost;
-        let tip = Vector3::from_row_slice(&found.positions[3 * self.topology.needle()..]);
-        let approach = self.approach(load, grip, &tip);
-        let mut pressed = self.pressed(&found.positions);
-        let (mut last_error, mut mix) = (Vec::new(), MIX.1);
-        let mut widening = if is_warm { 1.0 } else { FIRST_WIDENING };
-        let mut tolerance = ROUND_TOLERANCE.1;
-        let (mut change, mut last_change, mut cap) = (f64::INFINITY, f64::INFINITY, MIX.1);
-        for round in 1..=MAX_ROUNDS {
-            let reached = if is_warm { coefficient } else { coefficient.min(round as f64 * COEFFICIENT_STEP) };
-            let settling = reached == coefficient && widening == 1.0;
-            let points = self.rubbing_points(&approach, reached, &pressed);
-            let friction = Friction { faces: &self.faces, points: &points, full_slip_mm: FULL_SLIP_MM * widening };
-            let rubs = [Addition { effect: &friction, place: Place::Faces }];
-            let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
-            let with_friction = Load { additions: &additions, ..*load };
-            total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
-            let mut now = self.pressed(&found.positions);
-            change = now.change_from(&pressed);
-            if settling && change <= SETTLED && tolerance > self.contact.tolerance {
-                tolerance = self.contact.tolerance;
-                total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
-                now = self.pressed(&found.positions);
-                change = now.change_from(&pressed);
+        let approach = self.approach(load, grip, &self.tip(&near.positions));
+        let mut cost = near.newton;
+        cost.iterations += lost;
+        // What is held at a value ties the whole tissue together: it cannot be condensed to the surface.
+        let couples = load.multipliers().next().is_none()
+            && coefficient * self.pressed(&near.positions).steepness(load) <= COUPLED_UP_TO;
+        let coupled = couples.then(|| self.solve_coupled(load, coefficient, &approach, &near, workspace, progress));
+        let (found, rubbing, left) = match coupled {
+            Some(Ok(coupled)) => coupled,
+            Some(Err(stop @ NewtonError::Interrupted { .. })) => return Err(stop.into()),
+            failed => {
+                cost.iterations += failed.and_then(Result::err).map_or(0, |failure| failure.iterations());
+                let start = if is_warm { near } else { self.solve(load, near.positions, workspace, progress)? };
+                self.settle_pressures(load, coefficient, (grip, is_warm), start, workspace, progress)?
             }
-            if settling && change <= SETTLED {
-                let rubbing = self.rubbing(&friction, &found.positions, round);
-                let left = self.grip(&friction, &found.positions);
-                return Ok((Equilibrium { newton: total, ..found }, rubbing, left));
-            }
-            let error: Vec<f64> = now.forces_mn.iter().zip(&pressed.forces_mn).map(|(new, used)| new - used).collect();
-            if settling && last_error.len() == error.len() {
-                cap = if change > last_change { CALMING * cap } else { (HASTENING * cap).min(MIX.1) };
-                mix = next_mix(mix, &last_error, &error).min(cap);
-            }
-            if settling && tolerance > self.contact.tolerance {
-                // Pressures that do not come to rest are looked at closely.
-                let wanted = if change > last_change { 0.0 } else { FORCING * change };
-                tolerance = wanted.clamp(ROUND_TOLERANCE.0, ROUND_TOLERANCE.1);
-            }
-            last_change = change;
-            for (used, e) in pressed.forces_mn.iter_mut().zip(&error) {
-                *used = (*used + mix * e).max(0.0);
-            }
-            for (used, new) in pressed.normals.iter_mut().zip(&now.normals) {
-                // At a sharp edge normals swing as far as pressures; where the contact is new or gone, there is nothing to mix.
-                *used = if *used == Vector3::zeros() || *new == Vector3::zeros() {
-                    *new
-                } else {
-                    (*used * (1.0 - mix) + new * mix).normalize()
-                };
-            }
-            last_error = if settling { error } else { Vec::new() };
-            if reached == coefficient {
-                widening = (widening * NARROWING).max(1.0);
-            }
-        }
-        Err(EquilibriumError::NotSettled { rounds: MAX_ROUNDS, change, allowed: SETTLED })
+        };
+        cost += found.newton;
+        Ok((Equilibrium { newton: cost, ..found }, rubbing, left))
+    }
+
+    /// The equilibrium with friction whose limit follows the pressures, from `near` it.
+    ///
+    /// # Errors
+    /// [`NewtonError`].
+    fn solve_coupled(
+        &self,
+        load: &Load,
+        coefficient: f64,
+        approach: &Approach,
+        near: &Equilibrium,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<(Equilibrium, Rubbing, Grip), NewtonError> {
+        let contact = self.contact();
+        // Anchors are sought once for each point, and only where the needle presses.
+        let anchors = vec![OnceLock::new(); self.topology.faces.len() * self.faces.points];
+        let anchor = |group: usize, point: usize| {
+            *anchors[group * self.faces.points + point].get_or_init(|| approach.anchor(self, group, point))
+        };
+        let friction = CoupledFriction { contact: &contact, anchor: &anchor, coefficient, full_slip_mm: FULL_SLIP_MM };
+        let rubs = [Addition { effect: &friction, place: Place::Faces }];
+        let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
+        let with_friction = Load { additions: &additions, ..*load };
+        let drive = (self.drive(load.motion, 1.0), self.contact.tolerance);
+        let mut positions = near.positions.clone();
+        let newton =
+            self.newton(&self.contact, drive, &with_friction, &COUPLED, &mut positions, &mut 0, workspace, progress)?;
+        let found = self.equilibrium(load.motion, positions, newton, near.load_steps, workspace);
+        let points = self.rubbing_points(approach, coefficient, &self.pressed(&found.positions));
+        let friction = Friction { faces: &self.faces, points: points.into(), full_slip_mm: FULL_SLIP_MM };
+        let rubbing = self.rubbing(&friction, &found.positions);
+        let left = self.grip(&friction, &found.positions);
+        Ok((found, rubbing, left))
     }
 
     /// The equilibrium under the pressures that the last motion left, from which the new pressures are not far.
@@ -187,40 +174,17 @@ impl Wall<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<Equilibrium, EquilibriumError> {
-        let tip = Vector3::from_row_slice(&positions[3 * self.topology.needle()..]);
-        let points = self.rubbing_points(&self.approach(load, grip, &tip), coefficient, grip.pressed());
-        let friction = Friction { faces: &self.faces, points: &points, full_slip_mm: FULL_SLIP_MM };
+        let approach = self.approach(load, grip, &self.tip(positions));
+        let points = self.rubbing_points(&approach, coefficient, grip.pressed());
+        let friction = Friction { faces: &self.faces, points: points.into(), full_slip_mm: FULL_SLIP_MM };
         let rubs = [Addition { effect: &friction, place: Place::Faces }];
         let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
         self.solve_directly(&Load { additions: &additions, ..*load }, positions.to_vec(), workspace, progress)
     }
 
-    /// One more solve from an equilibrium nearby, to `tolerance` relative to the force scale: with full steps, and where they fail with a line search.
-    fn repeat(
-        &self,
-        load: &Load,
-        tolerance: f64,
-        found: &mut Equilibrium,
-        workspace: &mut Workspace,
-        progress: &mut dyn Progress,
-    ) -> Result<NewtonReport, NewtonError> {
-        let drive = self.drive(load.motion, 1.0);
-        let mut spent = 0;
-        let mut failure = NewtonError::Interrupted { iterations: 0 };
-        for attempt in &REPETITIONS {
-            let mut positions = found.positions.clone();
-            let drive = (drive, tolerance);
-            match self.newton(&self.contact, drive, load, attempt, &mut positions, &mut spent, workspace, progress) {
-                Ok(mut report) => {
-                    report.iterations = spent;
-                    *found = self.equilibrium(load.motion, positions, report, found.load_steps, workspace);
-                    return Ok(report);
-                }
-                Err(stop @ NewtonError::Interrupted { .. }) => return Err(stop),
-                Err(error) => failure = error,
-            }
-        }
-        Err(failure)
+    /// Where the needle's tip is at `positions` (mm).
+    fn tip(&self, positions: &[f64]) -> Vector3<f64> {
+        Vector3::from_row_slice(&positions[3 * self.topology.needle()..])
     }
 
     /// Normal forces and normals of every quadrature point.
@@ -230,19 +194,13 @@ impl Wall<'_> {
         let mut current = vec![0.0; 3 * stencils.group_size];
         let count = stencils.len() * self.faces.points;
         let mut pressed = Pressed { forces_mn: vec![0.0; count], normals: vec![Vector3::zeros(); count] };
-        let mut pose = self.tool.patch_from_needle;
-        pose.translation.vector = Vector3::from_row_slice(&positions[3 * self.topology.needle()..]);
         for group in 0..stencils.len() {
             stencils.gather(group, positions, &mut current);
             let local = Local { current: &current, group, predicted: &[] };
-            for (point, state) in contact.contact_points(&local).enumerate() {
-                if state.pressure_kpa > 0.0 {
-                    let at = group * self.faces.points + point;
-                    let gradient =
-                        self.tool.body.signed_distance(&pose.inverse_transform_point(&state.position)).gradient;
-                    pressed.forces_mn[at] = state.pressure_kpa * state.area_mm2;
-                    pressed.normals[at] = (pose.rotation * gradient).normalize();
-                }
+            for (point, force_mn, normal) in contact.pressing(&local) {
+                let at = group * self.faces.points + point;
+                pressed.forces_mn[at] = force_mn;
+                pressed.normals[at] = normal;
             }
         }
         pressed
@@ -267,7 +225,7 @@ impl Wall<'_> {
     }
 
     /// What slips, and with what force.
-    fn rubbing(&self, friction: &Friction, positions: &[f64], rounds: usize) -> Rubbing {
+    fn rubbing(&self, friction: &Friction, positions: &[f64]) -> Rubbing {
         let stencils = &self.topology.faces;
         let n = stencils.group_size;
         let mut current = vec![0.0; 3 * n];
@@ -283,17 +241,6 @@ impl Wall<'_> {
             }
         }
         let force_mn = Vector3::from_fn(|k, _| -gradient[(k + 1) * n - 1]);
-        Rubbing { slipping_share: if limit > 0.0 { slipping / limit } else { 0.0 }, force_mn, rounds }
+        Rubbing { slipping_share: if limit > 0.0 { slipping / limit } else { 0.0 }, force_mn }
     }
-}
-
-/// The share of the found pressures in the next mix, from the errors of two rounds (Irons & Tuck).
-fn next_mix(mix: f64, last: &[f64], now: &[f64]) -> f64 {
-    let (mut along, mut squared) = (0.0, 0.0);
-    for (last, now) in last.iter().zip(now) {
-        let change = now - last;
-        along += last * change;
-        squared += change * change;
-    }
-    if squared > 0.0 { (-mix * along / squared).clamp(MIX.0, MIX.1) } else { mix }
 }

@@ -5,7 +5,7 @@
 //!
 //! The body is convex, so along a ray from that plane the distance falls to its first zero as a convex function: Newton's method
 //! from before the zero never passes it, from just inside it steps back before it, and a distance that stops falling is a miss. From
-//! one radius to the next a parabola through the last heights gives the start, so two steps are the rule. A ball needs none.
+//! one radius to the next a parabola through the last heights gives the start, so one or two steps are the rule. A ball needs none, and is the same all around.
 //!
 //! Not here: the contact law.
 
@@ -136,11 +136,16 @@ impl Body {
         let up = -inward_local.into_inner();
         let base = about - up * up.dot(&(about - lowest));
         let across = lateral_axis(&up);
+        // A ball about its foremost point is the same along every azimuth, until the one towards the shaft's lean comes to the shaft.
+        let centred = self.is_round() && (about - lowest).norm() < ALIGNED;
+        let ball = radii_mm.iter().map_while(|&radius| self.height_on_ball(&(base + across * radius), &up));
+        let ball: Vec<f64> = ball.take(if centred { radii_mm.len() } else { 0 }).collect();
         let walk = |(direction, weight): (Vector3<f64>, f64)| {
             let mut walk = Walk::default();
             let mut heights = Vec::with_capacity(radii_mm.len());
+            heights.extend_from_slice(&ball);
             let mut previous = 0.0;
-            for &radius in radii_mm {
+            for &radius in &radii_mm[ball.len()..] {
                 if radius < previous {
                     walk = Walk::default();
                 }
@@ -183,18 +188,21 @@ impl Body {
 
     /// Height at which the ray from `origin` along `up` first meets the needle, mm; `None` when it misses.
     fn height_on_ray(&self, origin: &Point3<f64>, up: &Vector3<f64>, guess: f64) -> Option<f64> {
-        if self.is_round() {
-            let from_centre = origin - Point3::new(0.0, 0.0, self.edge_radius);
-            let towards = -from_centre.dot(up);
-            let half_chord_squared =
-                towards * towards - (from_centre.norm_squared() - self.edge_radius * self.edge_radius);
-            let height = towards - half_chord_squared.max(0.0).sqrt();
-            if half_chord_squared >= 0.0 && from_centre.z + height * up.z <= 0.0 {
-                return Some(height);
-            }
+        let on_ball = if self.is_round() { self.height_on_ball(origin, up) } else { None };
+        if on_ball.is_some() {
+            return on_ball;
         }
         // A guess may lie beyond the needle, where the distance no longer falls; the touching plane never does.
         self.advance(origin, up, guess).or_else(|| self.advance(origin, up, 0.0))
+    }
+
+    /// The same for a ball, `None` where the ray misses it or meets the shaft first.
+    fn height_on_ball(&self, origin: &Point3<f64>, up: &Vector3<f64>) -> Option<f64> {
+        let from_centre = origin - Point3::new(0.0, 0.0, self.edge_radius);
+        let towards = -from_centre.dot(up);
+        let half_chord_squared = towards * towards - (from_centre.norm_squared() - self.edge_radius * self.edge_radius);
+        let height = towards - half_chord_squared.max(0.0).sqrt();
+        (half_chord_squared >= 0.0 && from_centre.z + height * up.z <= 0.0).then_some(height)
     }
 
     /// Newton's method from a start on the ray; `None` where the distance does not fall along the ray.
@@ -207,7 +215,8 @@ impl Body {
             }
             let step = -distance / slope;
             height += step;
-            if step.abs() < STEP_TOLERANCE_MM {
+            // What a step leaves is half its square times curvature over slope; nothing is curved by more than two edges.
+            if step.abs() < STEP_TOLERANCE_MM || step * step < STEP_TOLERANCE_MM * self.edge_radius * -slope {
                 return Some(height);
             }
         }

@@ -3,11 +3,11 @@
 use nalgebra::{Point3, Unit, Vector3};
 use retina_core::effect::{Effect, Local, Stencils};
 use retina_core::effects::contact::ContactFaces;
-use retina_core::effects::friction::{Friction, RubbingPoint, anchor};
+use retina_core::effects::friction::{CoupledFriction, Friction, RubbingPoint, anchor};
 use retina_core::mesh::element::FACE_NODES;
 use retina_tests::tolerance::ROUNDOFF;
 
-use super::{Case, RADIUS, REPEATS, SIZES, STEP, added, check_effect, face, shapes};
+use super::{Case, RADIUS, REPEATS, SIZES, STEP, added, check_effect, face, for_each_contact, shapes};
 use crate::meshes::noise;
 
 /// Slip from which on friction is at its limit, in needle radii.
@@ -41,7 +41,8 @@ fn for_each(size: f64, mut visit: impl FnMut(&Friction, Case)) {
     for (label, slip) in [("sticking", 0.3 * FULL_SLIP), ("about to slip", FULL_SLIP), ("slipping", 10.0 * FULL_SLIP)] {
         for seed in 0..REPEATS as u64 {
             let points = [points(&faces, &stencils, &rest, slip, size, seed)];
-            let friction = Friction { faces: &faces, points: &points, full_slip_mm: FULL_SLIP * RADIUS * size };
+            let friction =
+                Friction { faces: &faces, points: (&points[..]).into(), full_slip_mm: FULL_SLIP * RADIUS * size };
             let mut current = vec![0.0; 3 * (FACE_NODES + 1)];
             stencils.gather(0, &rest, &mut current);
             let label = format!("{label}, seed {seed}, size {size:e}");
@@ -104,4 +105,52 @@ fn an_anchor_is_the_first_of_the_needle_on_its_way() {
             assert!((at - foremost).norm() < 1e-6, "{:?}: {at} {foremost}", shape.tip);
         }
     }
+}
+
+/// Coefficient of the coupled friction below.
+const COEFFICIENT: f64 = 0.4;
+/// By how much the needle is pushed on, in needle radii.
+const PUSHED: f64 = 5e-3;
+
+#[test]
+fn coupled_friction_is_held_friction_with_the_pressures_of_each_position() {
+    let n = FACE_NODES + 1;
+    let stencils = Stencils { group_size: n, vertices: (0..n as u32).collect() };
+    for_each_contact(1.0, |contact, case| {
+        let Case { label, current, .. } = case;
+        // Anchors beside the needle: everything slips the same way.
+        let beside = |_: usize, _: usize| Vector3::new(-2.0 * RADIUS, 0.5 * RADIUS, 0.0);
+        let full_slip_mm = FULL_SLIP * RADIUS;
+        let coupled = CoupledFriction { contact, anchor: &beside, coefficient: COEFFICIENT, full_slip_mm };
+        let positions: Vec<f64> = (0..3 * n).map(|at| current[at % 3 * n + at / 3]).collect();
+        let held = coupled.held_at(&stencils, &positions).expect("friction has no potential of its own");
+        let tip_force = |effect: &dyn Effect, current: &[f64]| {
+            let local = Local { current, group: 0, predicted: &[] };
+            let forces = added(3 * n, |out| effect.add_gradient(&local, out));
+            (Vector3::from_fn(|k, _| forces[k * n + FACE_NODES]), forces)
+        };
+        let stiffness = |effect: &dyn Effect| {
+            let local = Local { current: &current, group: 0, predicted: &[] };
+            added(9 * n * n, |out| effect.add_hessian(&local, out))
+        };
+        let (rubbed, forces) = tip_force(&coupled, &current);
+        assert_eq!(forces, tip_force(held.as_ref(), &current).1, "{label}: forces");
+        assert_eq!(stiffness(&coupled), stiffness(held.as_ref()), "{label}: stiffness");
+        let local = Local { current: &current, group: 0, predicted: &[] };
+        let normal_mn: f64 = contact.pressing(&local).map(|(_, force_mn, _)| force_mn).sum();
+        assert!(rubbed.norm() <= COEFFICIENT * normal_mn * (1.0 + ROUNDOFF), "{label}: beyond Coulomb's cone");
+        if normal_mn == 0.0 {
+            assert_eq!(forces, vec![0.0; 3 * n], "{label}: rubbed without touching");
+            return;
+        }
+        assert!(rubbed.norm() > 0.5 * COEFFICIENT * normal_mn, "{label}: what slips is at the limit, {rubbed}");
+        // Pushed on, the needle presses harder: what is held does not know.
+        let mut pushed = current.clone();
+        let outward = contact.pressing(&local).map(|(_, force_mn, normal)| normal * force_mn).sum::<Vector3<f64>>();
+        for (k, along) in outward.normalize().iter().enumerate() {
+            pushed[k * n + FACE_NODES] += PUSHED * RADIUS * along;
+        }
+        let [now, before] = [&coupled as &dyn Effect, held.as_ref()].map(|effect| tip_force(effect, &pushed).0.norm());
+        assert!(now > 1.01 * before, "{label}: {now} pushed on, {before} held");
+    });
 }

@@ -7,9 +7,12 @@ use super::super::dense::Dense;
 use super::super::newton::{System, Workspace};
 use super::super::sparse::norm;
 use crate::assemble::tail::{Stresses, Tail};
+use crate::effect::{Effect, Term};
 
 /// Iterations on the condensed system at most: each costs a small part of one on the whole.
 const MAX_ITERATIONS: usize = 20;
+/// Times at most that what is no gradient is held anew.
+const MAX_ROUNDS: usize = 5;
 /// Halvings of one of its steps: a needle that has lost touch moves as far as it may, and a stiff contact answers within a micrometre.
 const MAX_HALVINGS: usize = 16;
 /// Residual over the first one at which it is solved: the tissue's own change is more than what is left.
@@ -58,6 +61,56 @@ impl Model<'_> {
         let solved = REDUCTION * first.min(still.left);
         // A needle that has lost touch moves as far as it may in a Newton step.
         let mut at = if still.left < first { still } else { newton };
+        for round in 0..MAX_ROUNDS {
+            if at.left <= solved {
+                break;
+            }
+            let Some(next) = self.balance_held(&at, max_travel_mm, hessian, workspace) else {
+                at = self.balance(at, solved, max_travel_mm, hessian, workspace);
+                break;
+            };
+            // What is held at the start is far from what it is after the first step.
+            if round > 0 && next.left >= at.left {
+                break;
+            }
+            at = next;
+        }
+        (at.left < first).then_some(at.unknowns)
+    }
+
+    /// The state in balance with what is no gradient held as it is at `at`; `None` where there is no such thing.
+    fn balance_held(
+        &self,
+        at: &State,
+        max_travel_mm: f64,
+        hessian: &mut Dense,
+        workspace: &mut Workspace,
+    ) -> Option<State> {
+        let positions = self.positions(&at.unknowns);
+        let held: Vec<Option<Box<dyn Effect>>> =
+            self.tail.terms.iter().map(|term| term.effect.held_at(term.stencils, &positions)).collect();
+        if held.iter().all(Option::is_none) {
+            return None;
+        }
+        let terms = self.tail.terms.iter().zip(&held);
+        let terms: Vec<Term> =
+            terms.map(|(term, held)| Term { effect: held.as_deref().unwrap_or(term.effect), ..*term }).collect();
+        let model = Model { tail: Tail { terms: &terms, ..self.tail }, ..*self };
+        let start = model.state(at.unknowns.clone(), workspace);
+        let solved = REDUCTION * start.left;
+        let found = model.balance(start, solved, max_travel_mm, hessian, workspace);
+        Some(self.state(found.unknowns, workspace))
+    }
+
+    /// The state with no more than `solved` (mN) out of balance, or as near to it as steps from `at` bring.
+    fn balance(
+        &self,
+        mut at: State,
+        solved: f64,
+        max_travel_mm: f64,
+        hessian: &mut Dense,
+        workspace: &mut Workspace,
+    ) -> State {
         for _ in 0..MAX_ITERATIONS {
             if at.left <= solved {
                 break;
@@ -66,7 +119,7 @@ impl Model<'_> {
             let Some(next) = self.descend(&at, &step, max_travel_mm, workspace) else { break };
             at = next;
         }
-        (at.left < first).then_some(at.unknowns)
+        at
     }
 
     /// Newton's step from `at`; `None` if there is none.

@@ -1,0 +1,157 @@
+//! The repetition that friction needs where its pressures cannot be followed: solve, take new contact pressures and normals, solve again, until they settle.
+//!
+//! It starts from the frictionless equilibrium, or after another motion from the equilibrium under the pressures that this one left. The pressures of the next round are a mix of those used and those found (Irons & Tuck 1969): where the
+//! force along the motion is shared between pressure and friction, each round answers the last one's error with one of the opposite sign, and plain repetition
+//! would diverge beyond µ tan(angle) = 1. The friction itself begins with a coefficient that rises and a wide stick zone that narrows from round to round, so that no solve has to find many points' way
+//! across it at once. A round begins with the stiffness that the one before left, factorised, and ends as near to equilibrium as the pressures are to rest.
+
+use nalgebra::Vector3;
+
+use super::super::attempts::REPETITIONS;
+use super::super::error::EquilibriumError;
+use super::super::grip::Grip;
+use super::super::{Addition, Equilibrium, Load, Wall};
+use super::{FULL_SLIP_MM, Rubbing};
+use crate::effects::friction::Friction;
+use crate::mesh::wall::Place;
+use crate::progress::Progress;
+use crate::solve::newton::{NewtonError, NewtonReport, Workspace};
+
+/// Change of the pressures from one round to the next, relative to their sum, at which they count as settled. Friction is off by no more than
+/// this share.
+const SETTLED: f64 = 1e-3;
+/// Residual relative to the force scale at which a round stops, between these: no nearer to equilibrium than a share of what the pressures still change from round
+/// to round, for the next round moves it again (the forcing term of an inexact Newton method: Dembo, Eisenstat & Steihaug 1982). The last one goes on to that of
+/// every solve.
+const ROUND_TOLERANCE: (f64, f64) = (1e-3, 0.03);
+/// That share.
+const FORCING: f64 = 0.1;
+/// Rounds before friction counts as not settling.
+const MAX_ROUNDS: usize = 60;
+/// Largest rise of the coefficient from one round to the next: what is held at once by a high friction is held wherever it happens to be.
+const COEFFICIENT_STEP: f64 = 0.5;
+/// Factors on the largest share of the found pressures in the next mix after a round that changed more than the last, and after one that changed less: points
+/// of a sharp edge that touch and let go in turn come to rest.
+const CALMING: f64 = 0.5;
+/// See [`CALMING`].
+const HASTENING: f64 = 1.3;
+/// Stick zone of the first round over the last one's.
+const FIRST_WIDENING: f64 = 16.0;
+/// Factor by which the stick zone narrows from round to round.
+const NARROWING: f64 = 0.25;
+/// Bounds of the share of the found pressures in the next mix.
+const MIX: (f64, f64) = (0.05, 1.0);
+
+impl Wall<'_> {
+    /// The equilibrium with friction of the coefficient `coefficient`, from the one without it, or (`is_warm`) from the one under the pressures that the last motion left.
+    ///
+    /// # Errors
+    /// [`EquilibriumError`].
+    pub(super) fn settle_pressures(
+        &self,
+        load: &Load,
+        coefficient: f64,
+        (grip, is_warm): (&Grip, bool),
+        mut found: Equilibrium,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<(Equilibrium, Rubbing, Grip), EquilibriumError> {
+        let mut total = found.newton;
+        let approach = self.approach(load, grip, &self.tip(&found.positions));
+        let mut pressed = self.pressed(&found.positions);
+        let (mut last_error, mut mix) = (Vec::new(), MIX.1);
+        let mut widening = if is_warm { 1.0 } else { FIRST_WIDENING };
+        let mut tolerance = ROUND_TOLERANCE.1;
+        let (mut change, mut last_change, mut cap) = (f64::INFINITY, f64::INFINITY, MIX.1);
+        for round in 1..=MAX_ROUNDS {
+            let reached = if is_warm { coefficient } else { coefficient.min(round as f64 * COEFFICIENT_STEP) };
+            let settling = reached == coefficient && widening == 1.0;
+            let points = self.rubbing_points(&approach, reached, &pressed);
+            let friction =
+                Friction { faces: &self.faces, points: points.into(), full_slip_mm: FULL_SLIP_MM * widening };
+            let rubs = [Addition { effect: &friction, place: Place::Faces }];
+            let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
+            let with_friction = Load { additions: &additions, ..*load };
+            total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
+            let mut now = self.pressed(&found.positions);
+            change = now.change_from(&pressed);
+            if settling && change <= SETTLED && tolerance > self.contact.tolerance {
+                tolerance = self.contact.tolerance;
+                total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
+                now = self.pressed(&found.positions);
+                change = now.change_from(&pressed);
+            }
+            if settling && change <= SETTLED {
+                let rubbing = self.rubbing(&friction, &found.positions);
+                let left = self.grip(&friction, &found.positions);
+                return Ok((Equilibrium { newton: total, ..found }, rubbing, left));
+            }
+            let error: Vec<f64> = now.forces_mn.iter().zip(&pressed.forces_mn).map(|(new, used)| new - used).collect();
+            if settling && last_error.len() == error.len() {
+                cap = if change > last_change { CALMING * cap } else { (HASTENING * cap).min(MIX.1) };
+                mix = next_mix(mix, &last_error, &error).min(cap);
+            }
+            if settling && tolerance > self.contact.tolerance {
+                // Pressures that do not come to rest are looked at closely.
+                let wanted = if change > last_change { 0.0 } else { FORCING * change };
+                tolerance = wanted.clamp(ROUND_TOLERANCE.0, ROUND_TOLERANCE.1);
+            }
+            last_change = change;
+            for (used, e) in pressed.forces_mn.iter_mut().zip(&error) {
+                *used = (*used + mix * e).max(0.0);
+            }
+            for (used, new) in pressed.normals.iter_mut().zip(&now.normals) {
+                // At a sharp edge normals swing as far as pressures; where the contact is new or gone, there is nothing to mix.
+                *used = if *used == Vector3::zeros() || *new == Vector3::zeros() {
+                    *new
+                } else {
+                    (*used * (1.0 - mix) + new * mix).normalize()
+                };
+            }
+            last_error = if settling { error } else { Vec::new() };
+            if reached == coefficient {
+                widening = (widening * NARROWING).max(1.0);
+            }
+        }
+        Err(EquilibriumError::NotSettled { rounds: MAX_ROUNDS, change, allowed: SETTLED })
+    }
+
+    /// One more solve from an equilibrium nearby, to `tolerance` relative to the force scale: with full steps, and where they fail with a line search.
+    fn repeat(
+        &self,
+        load: &Load,
+        tolerance: f64,
+        found: &mut Equilibrium,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<NewtonReport, NewtonError> {
+        let drive = self.drive(load.motion, 1.0);
+        let mut spent = 0;
+        let mut failure = NewtonError::Interrupted { iterations: 0 };
+        for attempt in &REPETITIONS {
+            let mut positions = found.positions.clone();
+            let drive = (drive, tolerance);
+            match self.newton(&self.contact, drive, load, attempt, &mut positions, &mut spent, workspace, progress) {
+                Ok(mut report) => {
+                    report.iterations = spent;
+                    *found = self.equilibrium(load.motion, positions, report, found.load_steps, workspace);
+                    return Ok(report);
+                }
+                Err(stop @ NewtonError::Interrupted { .. }) => return Err(stop),
+                Err(error) => failure = error,
+            }
+        }
+        Err(failure)
+    }
+}
+
+/// The share of the found pressures in the next mix, from the errors of two rounds (Irons & Tuck).
+fn next_mix(mix: f64, last: &[f64], now: &[f64]) -> f64 {
+    let (mut along, mut squared) = (0.0, 0.0);
+    for (last, now) in last.iter().zip(now) {
+        let change = now - last;
+        along += last * change;
+        squared += change * change;
+    }
+    if squared > 0.0 { (-mix * along / squared).clamp(MIX.0, MIX.1) } else { mix }
+}
