@@ -10,6 +10,7 @@ pub mod mesh_file;
 mod obj;
 mod ply;
 mod stl;
+pub mod thinning;
 pub mod triangle_mesh;
 
 use nalgebra::{Point3, Unit, Vector3};

@@ -1,10 +1,13 @@
 //! A stored sample as a network sees a request: the same facts, described by the same code as in a prediction.
 
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use std::sync::OnceLock;
+
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use retina_core::needle::{NeedleShape, Tip};
 use retina_core::network::graph::Graph;
-use retina_core::network::input::{Answer, Field, Input, TissueNumbers};
-use retina_core::patch::Patch;
+use retina_core::network::input::{Answer, Field, Input, Relief, TissueNumbers};
+use retina_core::patch::{NODE_COUNT, Patch};
+use retina_core::scene::Scene;
 use retina_core::surface::Surface;
 
 use crate::sample::{self, LevelAnswer, Sample};
@@ -33,6 +36,29 @@ pub fn answer(answer: &LevelAnswer) -> Answer {
     }
 }
 
+/// Surface of every built-in scene, and how much thinner the retina is under its nodes than the tissue says (mm).
+fn surfaces() -> &'static [(Surface, [f32; NODE_COUNT])] {
+    static SURFACES: OnceLock<Vec<(Surface, [f32; NODE_COUNT])>> = OnceLock::new();
+    SURFACES.get_or_init(|| {
+        let scenes = Scene::built_in_names().iter().filter_map(|name| Scene::built_in(name));
+        let patches = scenes.filter_map(|scene| scene.patch(&Point3::origin()).ok());
+        patches
+            .map(|Patch { surface, vertices, .. }| {
+                let thinning_mm = std::array::from_fn(|node| surface.thinning(&vertices[node]).mm as f32);
+                (surface, thinning_mm)
+            })
+            .collect()
+    })
+}
+
+/// How the retina's thickness changes about a sample's contact: its scene's surface says, whatever its tissue is.
+fn relief(sample: &Sample) -> Relief {
+    let (surface, nodes_mm) = &surfaces()[usize::from(sample.scene)];
+    let [touch, center] =
+        [sample.touch_mm, sample.linear_center_mm].map(|at| surface.thinning(&Point3::from(at).cast::<f64>()));
+    Relief::new(nodes_mm, [touch.mm, center.mm], &center.slope, &center.bend)
+}
+
 /// What a network may know of `sample`: everything but the truth.
 pub fn input(sample: &Sample) -> Input {
     let shape = shape(&sample.tip);
@@ -51,6 +77,7 @@ pub fn input(sample: &Sample) -> Input {
             youngs_modulus_kpa: sample.tissue.youngs_modulus_kpa,
             poisson_ratio: sample.tissue.poisson_ratio,
         },
+        relief: relief(sample),
         touch_mm: sample.touch_mm.into(),
         inward: sample.inward.into(),
         center_mm: sample.linear_center_mm.into(),

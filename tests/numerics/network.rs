@@ -8,7 +8,7 @@ use retina_core::network::activation::activate;
 use retina_core::network::contact::{ContactNetwork, Memory, Start};
 use retina_core::network::features::{BASIS, Features};
 use retina_core::network::graph::Graph;
-use retina_core::network::input::{Answer, Input, TissueNumbers};
+use retina_core::network::input::{Answer, Input, Relief, TissueNumbers};
 use retina_core::network::packed::Packed;
 use retina_core::network::plain::affine;
 use retina_core::network::weights::{HASH, NETWORK, Weights, WeightsError, hash};
@@ -26,7 +26,7 @@ fn patch() -> Patch {
     Patch::grid(Surface::Sphere { radius_mm: 12.0 }, Isometry3::identity())
 }
 
-/// A leaning bevel in the tissue, with answers that no symmetry simplifies.
+/// A leaning bevel in the tissue, beside a pit, with answers that no symmetry simplifies.
 fn input(seed: u64) -> Input {
     let patch = patch();
     let mut random = fastrand::Rng::with_seed(seed);
@@ -49,6 +49,9 @@ fn input(seed: u64) -> Input {
         travel_mm,
         reaction_mn: (column.inward.into_inner() * -0.9).cast(),
     };
+    let pit = Surface::FovealPit { radius_mm: 12.0, depth_mm: 0.13, sigma_mm: 0.25 };
+    let [at_touch, at_center] = [column.surface, center].map(|at| pit.thinning(&(at + Vector3::new(0.2, -0.1, 0.0))));
+    let nodes_mm = std::array::from_fn(|node| pit.thinning(&patch.vertices[node]).mm as f32);
     let coarse = linear.map(|moved: Vector3<f32>| moved * 0.9);
     Input {
         rest_mm: std::array::from_fn(|node| patch.vertices[node].coords.cast()),
@@ -66,6 +69,7 @@ fn input(seed: u64) -> Input {
             youngs_modulus_kpa: [18.0, 7.0, 2000.0],
             poisson_ratio: [0.48, 0.2, 0.47],
         },
+        relief: Relief::new(&nodes_mm, [at_touch.mm, at_center.mm], &at_center.slope, &at_center.bend),
         touch_mm: column.surface.coords.cast(),
         inward: column.inward.into_inner().cast(),
         center_mm: center.coords.cast(),
@@ -98,6 +102,11 @@ fn mapped(input: &Input, map: &Matrix3<f64>) -> Input {
         rest_normal: input.rest_normal.map(|v| single * v),
         patch_from_needle: Isometry3::from_parts(at.into(), UnitQuaternion::from_rotation_matrix(&rotation)),
         direction: single * input.direction,
+        relief: Relief {
+            slope: single * input.relief.slope,
+            bend: single * input.relief.bend * single.transpose(),
+            ..input.relief
+        },
         touch_mm: single * input.touch_mm,
         inward: single * input.inward,
         center_mm: single * input.center_mm,
@@ -138,6 +147,21 @@ fn the_answer_turns_and_mirrors_with_all_that_is_asked() {
 }
 
 #[test]
+fn a_pit_beside_the_contact_is_seen() {
+    let graph = Graph::new(&patch().triangles);
+    let mut memory = Memory::default();
+    let level = Relief::new(&[0.0; NODE_COUNT], [0.0; 2], &Vector3::zeros(), &Matrix3::zeros());
+    for network in networks() {
+        let pitted = input(8);
+        let flat = Input { relief: level, ..pitted.clone() };
+        let [here, there] = [pitted, flat].map(|input| network.predict(&input, &graph, &mut memory).unwrap().answer);
+        let moved = |node: usize| (here.displacement_mm[node] - there.displacement_mm[node]).norm();
+        let most = (0..NODE_COUNT).map(moved).fold(0.0, f32::max);
+        assert!(most > 1e-3, "{most} mm");
+    }
+}
+
+#[test]
 fn the_order_of_the_nodes_does_not_matter() {
     let mut random = fastrand::Rng::with_seed(3);
     let mut order: Vec<usize> = (0..NODE_COUNT).collect();
@@ -151,6 +175,7 @@ fn the_order_of_the_nodes_does_not_matter() {
     let other = Input {
         rest_mm: shuffled(&input.rest_mm),
         rest_normal: shuffled(&input.rest_normal),
+        relief: Relief { node_mm: std::array::from_fn(|node| input.relief.node_mm[order[node]]), ..input.relief },
         linear: answer(&input.linear),
         coarse: input.coarse.as_ref().map(answer),
         ..input.clone()

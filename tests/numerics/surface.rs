@@ -1,6 +1,7 @@
 //! Surfaces at rest: columns, normals, height fields, sound meshes.
 
 use nalgebra::{Point2, Point3, Vector3};
+use retina_core::surface::thinning::Thinning;
 use retina_core::surface::{HeightField, MeshError, Surface, TriangleMesh};
 
 use crate::meshes::{grid_triangles, hills, hilly, noise};
@@ -48,6 +49,38 @@ fn the_pit_thins_the_retina_and_leaves_the_layers_below_on_a_ball() {
         assert!(((outer - centre).norm() - 12.23).abs() < 1e-12, "{x} {y}");
         let expected = 0.13 * (-(x * x + y * y) / 0.125f64).exp();
         assert!((column.retina_thinning_mm - expected).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn the_thinning_under_a_point_is_its_columns_and_is_derived_rightly() {
+    let thinning = |x: f64, y: f64| PIT.column(x, y).retina_thinning_mm;
+    for (x, y) in [(0.0, 0.0), (0.1, 0.0), (0.2, -0.15), (-0.4, 0.3), (0.7, 0.2)] {
+        let here = PIT.thinning(&PIT.column(x, y).surface);
+        assert!((here.mm - thinning(x, y)).abs() < 1e-14, "{x} {y}");
+        // A millimetre of x or y is one along the ball, but for (x / R)² and the pit's floor, which is R + 0.13 from the centre: 1 % of a slope, 2 % of a bend.
+        let h = 1e-4;
+        let along = [Vector3::x(), Vector3::y()];
+        let slopes = [thinning(x + h, y) - thinning(x - h, y), thinning(x, y + h) - thinning(x, y - h)];
+        for (axis, slope) in along.iter().zip(slopes.map(|d| d / (2.0 * h))) {
+            assert!(
+                (here.slope.dot(axis) - slope).abs() < 0.02 * (0.01 + slope.abs()),
+                "{x} {y}: {} {slope}",
+                here.slope
+            );
+        }
+        let (xs, ys) = (thinning(x + h, y) + thinning(x - h, y), thinning(x, y + h) + thinning(x, y - h));
+        let trace = (xs + ys - 4.0 * here.mm) / (h * h);
+        assert!(
+            (here.bend.trace() - trace).abs() < 0.03 * (0.1 + trace.abs()),
+            "{x} {y}: {} {trace}",
+            here.bend.trace()
+        );
+        let mixed = thinning(x + h, y + h) - thinning(x + h, y - h) - thinning(x - h, y + h) + thinning(x - h, y - h);
+        assert!((here.bend.m12 - mixed / (4.0 * h * h)).abs() < 0.03 * (0.1 + mixed.abs() / (4.0 * h * h)), "{x} {y}");
+    }
+    for surface in [Surface::Flat, Surface::Sphere { radius_mm: 12.0 }, field(5, 0.5)] {
+        assert_eq!(surface.thinning(&Point3::new(0.1, -0.2, 0.0)), Thinning::none());
     }
 }
 

@@ -27,6 +27,10 @@ pub struct ContactFrame {
     pub bevel: Vector3<f32>,
     /// Its part along the surface.
     pub bevel_tangent: Vector3<f32>,
+    /// Outward normal of a bevel's face; the way that other needles point.
+    pub face: Vector3<f32>,
+    /// How the retina thickens along the surface; zero where there is no pit.
+    pub slope: Vector3<f32>,
     /// Contact radius (mm).
     pub contact_mm: f32,
     /// Needle radius (mm).
@@ -44,9 +48,12 @@ impl ContactFrame {
         let along = |v: Vector3<f32>| v - inward * v.dot(&inward);
         let turn = input.patch_from_needle.rotation.cast::<f32>();
         let points = turn * -Vector3::z();
-        let bevel = match input.shape.tip {
-            Tip::Bevelled { .. } => turn * Vector3::x(),
-            Tip::Hemispherical | Tip::Flat { .. } => Vector3::zeros(),
+        let (bevel, face) = match input.shape.tip {
+            Tip::Bevelled { angle_deg, .. } => {
+                let (sin, cos) = (angle_deg as f32).to_radians().sin_cos();
+                (turn * Vector3::x(), points * sin - turn * Vector3::x() * cos)
+            }
+            Tip::Hemispherical | Tip::Flat { .. } => (Vector3::zeros(), points),
         };
         let radius_mm = input.shape.radius_mm as f32;
         let [retina, choroid, _] = input.tissue.thickness_mm;
@@ -58,6 +65,8 @@ impl ContactFrame {
             drive: along(input.direction),
             bevel,
             bevel_tangent: along(bevel),
+            face,
+            slope: along(input.relief.slope),
             contact_mm: input.contact_radius_mm.max(SMALLEST_CONTACT * radius_mm),
             radius_mm,
             yielding_mm: retina + choroid,

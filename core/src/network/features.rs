@@ -14,17 +14,17 @@ use crate::needle::Tip;
 use crate::patch::NODE_COUNT;
 
 /// Numbers of each node.
-pub const LOCAL: usize = 27;
+pub const LOCAL: usize = 33;
 /// Numbers of each node about `coarse`, besides.
 pub const LOCAL_COARSE: usize = 12;
 /// Numbers of the whole request.
-pub const GLOBAL: usize = 34;
+pub const GLOBAL: usize = 50;
 /// Numbers of the whole request about `coarse`, besides.
 pub const GLOBAL_COARSE: usize = 4;
 /// Vectors that a node's correction is made of.
-pub const BASIS: usize = 8;
+pub const BASIS: usize = 9;
 /// Vectors that the correction of the reaction is made of.
-pub const SIDES: usize = 3;
+pub const SIDES: usize = 4;
 
 /// What a correction far from the needle may be at most of the depth, per unit of coefficient, at the contact's centre.
 const FAR_SHARE: f32 = 0.1;
@@ -53,6 +53,11 @@ fn squash(x: f32) -> f32 {
     x / (1.0 + x.abs())
 }
 
+/// `x / (unit + |x|)`: the same of a length that may be far larger than its unit.
+fn squash_by(x: f32, unit: f32) -> f32 {
+    x / (unit + x.abs())
+}
+
 impl Features {
     /// Numbers of each node, with or without `coarse`.
     pub fn local_width(coarse: bool) -> usize {
@@ -69,10 +74,11 @@ impl Features {
         let frame = ContactFrame::new(input);
         self.global.clear();
         push_global(&mut self.global, input, &frame);
+        push_relief(&mut self.global, input, &frame);
         if let Some(coarse) = coarse {
             push_global_coarse(&mut self.global, input, &frame, coarse);
         }
-        self.sides = [frame.tilt, frame.drive, frame.bevel_tangent];
+        self.sides = [frame.tilt, frame.drive, frame.bevel_tangent, frame.slope];
         self.local.clear();
         self.basis.clear();
         self.scale_mm.clear();
@@ -83,6 +89,7 @@ impl Features {
             let start = coarse.unwrap_or(&input.linear).displacement_mm[node];
             let at = Place::new(&frame, input, node);
             at.push(&mut self.local, input, &frame, &linear_pose);
+            at.push_relief(&mut self.local, node, input, &frame);
             let moved = input.rest_mm[node] + start;
             let mut gradient = input.distance(&linear_pose, &moved).1;
             if let Some((coarse, pose)) = &coarse_pose {
@@ -98,6 +105,7 @@ impl Features {
                 start / (start.norm() + SOFT * frame.depth_mm).max(f32::MIN_POSITIVE),
                 frame.tangent(&input.rest_normal[node]),
                 frame.tangent(&gradient),
+                frame.slope,
             ]);
             self.scale_mm.push(start.norm() + FAR_SHARE * frame.depth_mm * decay * decay);
             self.pool.push(decay);
@@ -175,6 +183,18 @@ impl Place {
             squash((local.x - axis_x).hypot(local.y) / radius_mm),
             bevelled * squash(local.x / radius_mm),
             self.normal.dot(drive),
+            self.radial.dot(&frame.face),
+            squash_by(self.offset.dot(&frame.face), depth),
+        ]);
+    }
+
+    /// What a pit changes at a node.
+    fn push_relief(&self, to: &mut Vec<f32>, node: usize, input: &Input, frame: &ContactFrame) {
+        to.extend([
+            input.relief.node_mm[node] / frame.yielding_mm,
+            frame.slope.dot(&self.radial),
+            frame.slope.dot(&self.normal),
+            frame.yielding_mm * self.radial.dot(&(input.relief.bend * self.radial)),
         ]);
     }
 }
@@ -221,6 +241,8 @@ fn push_global(to: &mut Vec<f32>, input: &Input, frame: &ContactFrame) {
         Tip::Bevelled { angle_deg, .. } => (angle_deg / 90.0) as f32,
         Tip::Hemispherical | Tip::Flat { .. } => 1.0,
     };
+    // The sine of the angle between face and surface: a cosine hardly feels the first degrees, which decide whether a face or its edge presses.
+    let leaning = frame.tangent(&frame.face).norm();
     let shift = frame.tangent(&(input.center_mm - input.touch_mm)) / *contact_mm;
     to.extend([
         (contact_mm / radius_mm).ln(),
@@ -249,6 +271,12 @@ fn push_global(to: &mut Vec<f32>, input: &Input, frame: &ContactFrame) {
         tilt.dot(drive),
         drive.norm_squared(),
         frame.bevel.dot(inward),
+        frame.face.dot(inward),
+        frame.face.dot(&input.direction),
+        leaning,
+        squash_by(radius_mm * leaning, depth_mm.max(f32::MIN_POSITIVE)),
+        tilt.norm(),
+        drive.norm(),
         bevel_tangent.norm_squared(),
         bevel_tangent.dot(tilt),
         bevel_tangent.dot(drive),
@@ -257,6 +285,26 @@ fn push_global(to: &mut Vec<f32>, input: &Input, frame: &ContactFrame) {
         squash(shift.dot(bevel_tangent)),
         curvature(input, frame) * yielding_mm,
         input.linear.reaction_mn.norm() / input.force_mn.max(f32::MIN_POSITIVE),
+    ]);
+}
+
+/// What a pit changes for the whole request: the retina under the contact, how it thickens and how the surface bends there.
+fn push_relief(to: &mut Vec<f32>, input: &Input, frame: &ContactFrame) {
+    let ContactFrame { tilt, drive, bevel_tangent, slope, contact_mm, radius_mm, yielding_mm, .. } = frame;
+    let bend = input.relief.bend;
+    let around = bend.trace();
+    let along = |v: &Vector3<f32>| yielding_mm * v.dot(&(bend * v));
+    to.extend([
+        input.relief.center_mm / yielding_mm,
+        slope.norm(),
+        slope.dot(tilt),
+        slope.dot(drive),
+        slope.dot(bevel_tangent),
+        yielding_mm * around,
+        squash(radius_mm * around),
+        contact_mm * contact_mm * around / yielding_mm,
+        along(tilt),
+        along(bevel_tangent),
     ]);
 }
 

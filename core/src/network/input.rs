@@ -3,7 +3,7 @@
 //! Everything is in the patch frame; lengths mm, forces mN, moduli kPa. The same facts as a stored sample's, so that what was trained
 //! on and what is asked later are described by the same code.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use crate::needle::{Body, NeedleShape};
 use crate::patch::NODE_COUNT;
@@ -20,6 +20,37 @@ pub struct TissueNumbers {
     pub youngs_modulus_kpa: [f32; 3],
     /// Poisson's ratios.
     pub poisson_ratio: [f32; 3],
+}
+
+/// How the retina's thickness changes about the contact: zeros everywhere but in a pit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Relief {
+    /// How much thicker the retina is under each node than where the needle touches (mm).
+    pub node_mm: [f32; NODE_COUNT],
+    /// The same under the centre of the contact (mm).
+    pub center_mm: f32,
+    /// Derivative of the thickness along the surface there (mm per mm).
+    pub slope: Vector3<f32>,
+    /// Second derivative (1/mm).
+    pub bend: Matrix3<f32>,
+}
+
+impl Relief {
+    /// From how much thinner the retina is than the tissue says under the nodes, where the needle touches and under the contact's centre (mm), and the derivatives
+    /// of that thinning at the centre.
+    pub fn new(
+        nodes_mm: &[f32; NODE_COUNT],
+        [touch_mm, center_mm]: [f64; 2],
+        slope: &Vector3<f64>,
+        bend: &Matrix3<f64>,
+    ) -> Self {
+        Relief {
+            node_mm: nodes_mm.map(|thinning_mm| touch_mm as f32 - thinning_mm),
+            center_mm: (touch_mm - center_mm) as f32,
+            slope: -slope.cast::<f32>(),
+            bend: -bend.cast::<f32>(),
+        }
+    }
 }
 
 /// What a level answers.
@@ -52,6 +83,8 @@ pub struct Input {
     pub force_mn: f32,
     /// The tissue.
     pub tissue: TissueNumbers,
+    /// How the retina's thickness changes.
+    pub relief: Relief,
     /// Where it first touches (mm).
     pub touch_mm: Vector3<f32>,
     /// Unit inward normal of the surface there.

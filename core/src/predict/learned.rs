@@ -17,8 +17,8 @@ use super::types::{ContactReport, ContactState, Level, PredictError, SolverRepor
 use crate::effects::{adhesion, bleb, friction, pressure};
 use crate::network::contact::{Corrected, Memory};
 use crate::network::graph::Graph;
-use crate::network::input::{Answer, Field, Input, TissueNumbers};
-use crate::patch::{Patch, vertex_normals};
+use crate::network::input::{Answer, Field, Input, Relief, TissueNumbers};
+use crate::patch::{NODE_COUNT, Patch, vertex_normals};
 use crate::progress::Progress;
 
 /// What a network needs of a patch at rest, made once where the patch is the scene's.
@@ -26,6 +26,8 @@ use crate::progress::Progress;
 pub(crate) struct RestPatch {
     positions: Field,
     normals: Field,
+    /// How much thinner the retina is under each node than the tissue says (mm).
+    thinning_mm: [f32; NODE_COUNT],
     graph: Graph,
 }
 
@@ -35,6 +37,7 @@ impl RestPatch {
         RestPatch {
             positions: std::array::from_fn(|node| patch.vertices[node].coords.cast()),
             normals: std::array::from_fn(|node| normals[node].cast()),
+            thinning_mm: std::array::from_fn(|node| patch.surface.thinning(&patch.vertices[node]).mm as f32),
             graph: Graph::new(&patch.triangles),
         }
     }
@@ -138,6 +141,9 @@ impl Question<'_> {
         thickness_mm[0] = (layers[0].thickness_mm - touched.retina_thinning_mm) as f32;
         let inward = linear.press.touch.inward.into_inner();
         let parameters = &self.patch().parameters;
+        let center = surface.column(linear.center[0], linear.center[1]).surface;
+        let thinning = surface.thinning(&center);
+        let thinnings_mm = [touched.retina_thinning_mm, thinning.mm];
         Input {
             rest_mm: rest.positions,
             rest_normal: rest.normals,
@@ -151,9 +157,10 @@ impl Question<'_> {
                 youngs_modulus_kpa: layers.map(|layer| layer.youngs_modulus_kpa as f32),
                 poisson_ratio: layers.map(|layer| layer.poisson_ratio as f32),
             },
+            relief: Relief::new(&rest.thinning_mm, thinnings_mm, &thinning.slope, &thinning.bend),
             touch_mm: touched.surface.coords.cast(),
             inward: inward.cast(),
-            center_mm: surface.column(linear.center[0], linear.center[1]).surface.coords.cast(),
+            center_mm: center.coords.cast(),
             depth_mm: linear.depth_mm as f32,
             contact_radius_mm: linear.contact_radius_mm as f32,
             pressure_kpa: linear.max_pressure_kpa as f32,
