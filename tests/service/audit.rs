@@ -67,10 +67,15 @@ fn an_audit_gives_way_to_every_request() {
         }
         quantile(&times, 0.5)
     };
-    let (without, with_audit) = (median_ms(&alone), median_ms(&audited));
-    let text = metrics(&audited);
-    let interrupted = count(&text, r#"retina_audits_total{level="linear",outcome="interrupted"}"#);
-    assert!(interrupted >= 5.0, "{interrupted}: {text}");
+    let (without, mut with_audit) = (median_ms(&alone), median_ms(&audited));
+    let interrupted = || count(&metrics(&audited), r#"retina_audits_total{level="linear",outcome="interrupted"}"#);
+    // On a busy machine a thread of the lowest priority rarely begins.
+    for _ in 0..5 {
+        if interrupted() < 5.0 {
+            with_audit = with_audit.max(median_ms(&audited));
+        }
+    }
+    assert!(interrupted() >= 5.0, "{}", metrics(&audited));
     // A computation at level reference takes a second or more: whoever waited for one would see it.
     assert!(
         with_audit < without + 50.0,
