@@ -13,18 +13,25 @@ use crate::harness::{Running, agent, request, runtime};
 
 #[test]
 fn a_client_that_goes_stops_its_work() {
-    with_client(&["--threads", "1"], async |service, mut client| {
-        let predict = |level: &str| tokio::task::block_in_place(|| service.predict(&agent(), &request(level)));
-        let started = Instant::now();
-        assert_eq!(predict("reference").0, 200);
-        let whole = started.elapsed();
-        client.open(level("reference")).await.expect("session");
-        client.send(&pose(1)).await.expect("sent");
-        tokio::time::sleep(whole / 10).await;
-        drop(client);
-        let started = Instant::now();
-        assert_eq!(predict("linear").0, 200);
-        let waited = started.elapsed();
+    with_client(&["--threads", "1"], async |service, first| {
+        let predict = |level: &str| {
+            let started = Instant::now();
+            let status = tokio::task::block_in_place(|| service.predict(&agent(), &request(level)).0);
+            assert_eq!(status, 200);
+            started.elapsed()
+        };
+        let whole = predict("reference");
+        drop(first);
+        let mut waited = Duration::MAX;
+        // A busy machine may hold up one of them.
+        for _ in 0..3 {
+            let mut client = StreamClient::connect(service.address).await.expect("handshake");
+            client.open(level("reference")).await.expect("session");
+            client.send(&pose(1)).await.expect("sent");
+            tokio::time::sleep(whole / 10).await;
+            drop(client);
+            waited = waited.min(predict("linear"));
+        }
         assert!(waited < whole / 2, "waited {waited:?} behind work of {whole:?} that nobody wanted");
     });
 }
