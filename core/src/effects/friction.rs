@@ -17,8 +17,6 @@
 
 mod coupled;
 
-use std::borrow::Cow;
-
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use super::contact::{ContactFaces, GROUP};
@@ -48,7 +46,7 @@ pub struct Friction<'a> {
     /// The faces at rest.
     pub faces: &'a ContactFaces,
     /// The points that rub, face by face.
-    pub points: Cow<'a, [Vec<RubbingPoint>]>,
+    pub points: Vec<Vec<RubbingPoint>>,
     /// Slip ε from which on friction is at its limit (mm).
     pub full_slip_mm: f64,
 }

@@ -14,10 +14,9 @@ use nalgebra::Vector3;
 use super::attempts::COUPLED;
 use super::error::EquilibriumError;
 use super::grip::{Approach, Grip};
-use super::{Addition, Equilibrium, Load, Wall};
+use super::{Equilibrium, Load, Wall};
 use crate::effect::{Effect, Local};
 use crate::effects::friction::{CoupledFriction, Friction, RubbingPoint};
-use crate::mesh::wall::Place;
 use crate::progress::Progress;
 use crate::solve::newton::{NewtonError, Workspace};
 
@@ -146,18 +145,16 @@ impl Wall<'_> {
             *anchors[group * self.faces.points + point].get_or_init(|| approach.anchor(self, group, point))
         };
         let friction = CoupledFriction { contact: &contact, anchor: &anchor, coefficient, full_slip_mm: FULL_SLIP_MM };
-        let rubs = [Addition { effect: &friction, place: Place::Faces }];
-        let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
+        let additions = load.with_faces(&friction);
         let with_friction = Load { additions: &additions, ..*load };
         let drive = (self.drive(load.motion, 1.0), self.contact.tolerance);
         let mut positions = near.positions.clone();
         let newton =
             self.newton(&self.contact, drive, &with_friction, &COUPLED, &mut positions, &mut 0, workspace, progress)?;
         let found = self.equilibrium(load.motion, positions, newton, near.load_steps, workspace);
-        let points = self.rubbing_points(approach, coefficient, &self.pressed(&found.positions));
-        let friction = Friction { faces: &self.faces, points: points.into(), full_slip_mm: FULL_SLIP_MM };
-        let rubbing = self.rubbing(&friction, &found.positions);
-        let left = self.grip(&friction, &found.positions);
+        let held = friction.held(&self.topology.faces, &found.positions);
+        let rubbing = self.rubbing(&held, &found.positions);
+        let left = self.grip(&held, &found.positions);
         Ok((found, rubbing, left))
     }
 
@@ -176,9 +173,8 @@ impl Wall<'_> {
     ) -> Result<Equilibrium, EquilibriumError> {
         let approach = self.approach(load, grip, &self.tip(positions));
         let points = self.rubbing_points(&approach, coefficient, grip.pressed());
-        let friction = Friction { faces: &self.faces, points: points.into(), full_slip_mm: FULL_SLIP_MM };
-        let rubs = [Addition { effect: &friction, place: Place::Faces }];
-        let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
+        let friction = Friction { faces: &self.faces, points, full_slip_mm: FULL_SLIP_MM };
+        let additions = load.with_faces(&friction);
         self.solve_directly(&Load { additions: &additions, ..*load }, positions.to_vec(), workspace, progress)
     }
 

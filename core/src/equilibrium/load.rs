@@ -97,6 +97,12 @@ pub struct Load<'a> {
 }
 
 impl Load<'_> {
+    /// What acts besides, and `effect` on the faces.
+    pub(super) fn with_faces<'b>(&'b self, effect: &'b dyn Effect) -> Vec<Addition<'b>> {
+        let joined = Addition { effect, place: Place::Faces };
+        self.additions.iter().copied().chain([joined]).collect()
+    }
+
     /// The multipliers of what acts.
     pub(super) fn multipliers(&self) -> impl Iterator<Item = &Multiplier> {
         self.additions.iter().filter_map(|addition| addition.effect.multiplier())

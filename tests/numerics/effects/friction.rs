@@ -40,9 +40,8 @@ fn for_each(size: f64, mut visit: impl FnMut(&Friction, Case)) {
     let faces = ContactFaces::new(&stencils, &rest, 3);
     for (label, slip) in [("sticking", 0.3 * FULL_SLIP), ("about to slip", FULL_SLIP), ("slipping", 10.0 * FULL_SLIP)] {
         for seed in 0..REPEATS as u64 {
-            let points = [points(&faces, &stencils, &rest, slip, size, seed)];
-            let friction =
-                Friction { faces: &faces, points: (&points[..]).into(), full_slip_mm: FULL_SLIP * RADIUS * size };
+            let points = vec![points(&faces, &stencils, &rest, slip, size, seed)];
+            let friction = Friction { faces: &faces, points, full_slip_mm: FULL_SLIP * RADIUS * size };
             let mut current = vec![0.0; 3 * (FACE_NODES + 1)];
             stencils.gather(0, &rest, &mut current);
             let label = format!("{label}, seed {seed}, size {size:e}");

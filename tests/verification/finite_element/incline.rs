@@ -83,7 +83,7 @@ fn lean(coefficient: f64, tangent: f64) -> Result<(Vector3<f64>, Vector3<f64>), 
                 contact.contact_points(&local).enumerate().map(rubbing).collect()
             })
             .collect();
-        let friction = Friction { faces: &contact_faces, points: (&points[..]).into(), full_slip_mm: FULL_SLIP_MM };
+        let friction = Friction { faces: &contact_faces, points, full_slip_mm: FULL_SLIP_MM };
         let terms = [
             Term { effect: &solid, stencils: &mesh.elements, set: 0 },
             Term { effect: &contact, stencils: &faces, set: 1 },

@@ -62,7 +62,7 @@ impl Slider {
     /// Moves the needle; the force that it drags the face with (mN) and what the slip lost (µJ). Sticking points are anchored where the last motion left them.
     fn drag(&mut self, needle: Vector3<f64>) -> (Vector3<f64>, f64) {
         let points = self.points.clone();
-        let friction = Friction { faces: &self.faces, points: (&points[..]).into(), full_slip_mm: FULL_SLIP_MM };
+        let friction = Friction { faces: &self.faces, points, full_slip_mm: FULL_SLIP_MM };
         let n = FACE_NODES + 1;
         let dragging = |current: &[f64]| -> Vector3<f64> {
             let mut out = vec![0.0; 3 * n];

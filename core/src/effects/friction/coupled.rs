@@ -36,6 +36,17 @@ impl CoupledFriction<'_> {
         rubbing.collect()
     }
 
+    /// Friction under the pressures at `positions`.
+    pub fn held(&self, stencils: &Stencils, positions: &[f64]) -> Friction<'_> {
+        let mut current = vec![0.0; 3 * stencils.group_size];
+        let points = (0..stencils.len()).map(|group| {
+            stencils.gather(group, positions, &mut current);
+            let local = Local { current: &current, group, predicted: &[] };
+            if self.is_active(&local) { self.points(&local) } else { Vec::new() }
+        });
+        Friction { faces: self.contact.faces, points: points.collect(), full_slip_mm: self.full_slip_mm }
+    }
+
     /// With the law at the points of a face.
     fn with_law<T>(&self, local: &Local, act: impl FnOnce(&Law) -> T) -> T {
         let points = self.points(local);
@@ -66,14 +77,6 @@ impl Effect for CoupledFriction<'_> {
     }
 
     fn held_at<'a>(&'a self, stencils: &Stencils, positions: &[f64]) -> Option<Box<dyn Effect + 'a>> {
-        let mut current = vec![0.0; 3 * stencils.group_size];
-        let points = (0..stencils.len()).map(|group| {
-            stencils.gather(group, positions, &mut current);
-            let local = Local { current: &current, group, predicted: &[] };
-            if self.is_active(&local) { self.points(&local) } else { Vec::new() }
-        });
-        let points: Vec<Vec<RubbingPoint>> = points.collect();
-        let full_slip_mm = self.full_slip_mm;
-        Some(Box::new(Friction { faces: self.contact.faces, points: points.into(), full_slip_mm }))
+        Some(Box::new(self.held(stencils, positions)))
     }
 }

@@ -10,10 +10,9 @@ use nalgebra::Vector3;
 use super::super::attempts::REPETITIONS;
 use super::super::error::EquilibriumError;
 use super::super::grip::Grip;
-use super::super::{Addition, Equilibrium, Load, Wall};
+use super::super::{Equilibrium, Load, Wall};
 use super::{FULL_SLIP_MM, Rubbing};
 use crate::effects::friction::Friction;
-use crate::mesh::wall::Place;
 use crate::progress::Progress;
 use crate::solve::newton::{NewtonError, NewtonReport, Workspace};
 
@@ -67,10 +66,8 @@ impl Wall<'_> {
             let reached = if is_warm { coefficient } else { coefficient.min(round as f64 * COEFFICIENT_STEP) };
             let settling = reached == coefficient && widening == 1.0;
             let points = self.rubbing_points(&approach, reached, &pressed);
-            let friction =
-                Friction { faces: &self.faces, points: points.into(), full_slip_mm: FULL_SLIP_MM * widening };
-            let rubs = [Addition { effect: &friction, place: Place::Faces }];
-            let additions: Vec<Addition> = load.additions.iter().chain(&rubs).copied().collect();
+            let friction = Friction { faces: &self.faces, points, full_slip_mm: FULL_SLIP_MM * widening };
+            let additions = load.with_faces(&friction);
             let with_friction = Load { additions: &additions, ..*load };
             total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
             let mut now = self.pressed(&found.positions);
