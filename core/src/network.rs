@@ -20,4 +20,5 @@ pub mod observer;
 pub mod packed;
 pub mod plain;
 pub mod projection;
+pub mod softmax;
 pub mod weights;

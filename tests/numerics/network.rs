@@ -11,6 +11,7 @@ use retina_core::network::graph::Graph;
 use retina_core::network::input::{Answer, Input, Relief, TissueNumbers};
 use retina_core::network::packed::Packed;
 use retina_core::network::plain::affine;
+use retina_core::network::softmax::{LEAST, exp_of_negative, softmax};
 use retina_core::network::weights::{HASH, NETWORK, Weights, WeightsError, hash};
 use retina_core::patch::{NODE_COUNT, Patch};
 use retina_core::surface::Surface;
@@ -348,4 +349,26 @@ fn a_product_with_packed_weights_is_the_product() {
         }
         assert_ne!(out, before);
     }
+}
+
+/// Against the library's exponential in twice the digits: two units of the last digit, zero where it says so, and no number stays none.
+#[test]
+fn the_softmax_has_the_exponential_to_its_last_digits() {
+    let mut largest = 0.0_f64;
+    for at in 0..=800_000 {
+        let x = LEAST * (at as f32 / 800_000.0);
+        let exact = f64::from(x).exp();
+        largest = largest.max((f64::from(exp_of_negative(x)) - exact).abs() / exact);
+    }
+    assert!(largest < 2.0 * f64::from(f32::EPSILON), "{largest}");
+    assert_eq!(exp_of_negative(0.0), 1.0);
+    assert_eq!(exp_of_negative(LEAST - 1e-3), 0.0);
+    assert_eq!(exp_of_negative(f32::NEG_INFINITY), 0.0);
+    assert!(exp_of_negative(f32::NAN).is_nan());
+    let mut rows = vec![3.0, -200.0, 4.0, f32::NAN, 1.0, 2.0];
+    softmax(&mut rows, 3);
+    let e = std::f32::consts::E;
+    assert_eq!(rows[1], 0.0);
+    assert!((rows[0] - 1.0 / (1.0 + e)).abs() < f32::EPSILON && (rows[2] - e / (1.0 + e)).abs() < f32::EPSILON);
+    assert!(rows[3..].iter().any(|x| x.is_nan()), "{rows:?}");
 }

@@ -23,6 +23,7 @@ use super::dense::{Into, fill_rows, product, product_transposed};
 use super::input::Field;
 use super::observer::Observer;
 use super::packed::Packed;
+use super::softmax::softmax;
 use super::weights::{Weights, WeightsError};
 use crate::patch::NODE_COUNT;
 use features::{RIGID, SOFT};
@@ -81,16 +82,6 @@ pub struct Memory {
 /// `x = max(x, 0)`.
 pub fn relu(x: &mut [f32]) {
     x.iter_mut().for_each(|x| *x = x.max(0.0));
-}
-
-/// Every row of `columns` numbers becomes positive and adds up to one.
-pub fn softmax(rows: &mut [f32], columns: usize) {
-    for row in rows.chunks_exact_mut(columns) {
-        let largest = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        row.iter_mut().for_each(|x| *x = (*x - largest).exp());
-        let total: f32 = row.iter().sum();
-        row.iter_mut().for_each(|x| *x /= total);
-    }
 }
 
 impl FaithfulNetwork {

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use retina_core::network::faithful::{WIDTH, relu, softmax};
+use retina_core::network::faithful::{WIDTH, relu};
+use retina_core::network::softmax::softmax;
 
 use crate::train::matrix::{add_product, add_product_transposed, add_row_sum, add_transposed_product};
 
