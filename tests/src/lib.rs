@@ -10,6 +10,7 @@ pub mod http_load;
 pub mod igtl_client;
 pub mod laws;
 pub mod local_service;
+pub mod machine_time;
 pub mod malformed;
 pub mod overload;
 pub mod paper_network;

@@ -4,8 +4,8 @@
 use std::time::Instant;
 
 use retina_core::comparison::quantile;
-use retina_tests::http_load::cpu_seconds;
 use retina_tests::local_service;
+use retina_tests::machine_time::cpu_seconds;
 use serde_json::json;
 
 /// Most batches, and most poses of one: what the service allows by default.
