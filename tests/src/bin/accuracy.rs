@@ -1,7 +1,8 @@
 //! What accuracy costs in time: every level and every knob of level `coarse` against the reference, in one run on one thread.
 //!
 //! `cargo run --release -p retina-tests --bin accuracy [-- REQUESTS [SEED]]` writes `docs/accuracy/report.md`, `results.json` and `chart.svg`. Requests are those
-//! of each of three panels (default, hard, outside); a reference takes seconds, so 30 a panel take about ten minutes on a quiet machine.
+//! of each of three panels (default, hard, outside); a reference takes seconds, so 30 a panel take about ten minutes on a quiet machine. Where `docs/accuracy/before.json` holds the results of an earlier program, they are shown
+//! beside (`cost::before`).
 
 use std::error::Error;
 use std::fs;
@@ -13,7 +14,7 @@ use retina_tests::cost::contestant::contestants;
 use retina_tests::cost::measure::measure;
 use retina_tests::cost::panel::Panel;
 use retina_tests::cost::report::{Circumstances, Results, markdown};
-use retina_tests::cost::{chart, report, small};
+use retina_tests::cost::{before, chart, report, small};
 
 /// Requests of each panel unless told.
 const REQUESTS: usize = 30;
@@ -41,9 +42,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let results = Results { circumstances: circumstances(requests, seed), panels, small };
     let folder = Path::new(OUTPUT);
     fs::create_dir_all(folder)?;
-    fs::write(folder.join("chart.svg"), chart::svg(&results.panels, "What accuracy costs in time"))?;
+    let before = before::read(folder)?;
+    let rings = before.as_ref().map_or(&[][..], |before| &before.panels);
+    fs::write(folder.join("chart.svg"), chart::svg(&results.panels, rings, "What accuracy costs in time"))?;
     fs::write(folder.join("results.json"), serde_json::to_string_pretty(&results)?)?;
-    let text = markdown(&results, "chart.svg");
+    let mut text = markdown(&results, "chart.svg");
+    text.extend(before.map(|before| before::markdown(&before, &results.panels)));
     fs::write(folder.join("report.md"), &text)?;
     println!("{text}");
     Ok(())

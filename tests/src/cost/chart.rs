@@ -1,10 +1,11 @@
 //! The chart: error against time, a panel beside the other, both axes logarithmic.
 //!
 //! A dot is a contestant's median; the line to the right of it ends at the 99th percentile of its error, the tick at its largest, the line above at the
-//! 99th percentile of its time. Plain SVG, so that any browser and any page shows it.
+//! 99th percentile of its time. A ring with a dotted line to a level's dot is where an earlier program stood. Plain SVG, so that any browser and any page shows it.
 
 use std::fmt::Write;
 
+use super::before::levels_twice;
 use super::measure::{Measured, Standing};
 use super::pareto::undominated;
 
@@ -51,8 +52,8 @@ impl Frame {
     }
 }
 
-/// The whole chart as SVG text.
-pub fn svg(panels: &[Measured], title: &str) -> String {
+/// The whole chart as SVG text; `before` are the panels of an earlier program, or none.
+pub fn svg(panels: &[Measured], before: &[Measured], title: &str) -> String {
     let width = LEFT + panels.len() as f64 * (PANEL_WIDTH + GAP);
     let height = TOP + PANEL_HEIGHT + BOTTOM;
     let mut out = String::new();
@@ -67,6 +68,9 @@ pub fn svg(panels: &[Measured], title: &str) -> String {
         axes(&mut out, &frame, panel, index == 0);
         let everybody: Vec<&Standing> = panel.standings.iter().chain([&panel.reference]).collect();
         let best = undominated(&everybody);
+        for (earlier, now) in levels_twice(panel, before) {
+            ring(&mut out, &frame, earlier, now);
+        }
         pareto_line(&mut out, &frame, &everybody, &best);
         for (standing, best) in everybody.into_iter().zip(best) {
             dot(&mut out, &frame, standing, best);
@@ -157,6 +161,18 @@ fn pareto_line(out: &mut String, frame: &Frame, everybody: &[&Standing], best: &
         writeln!(out, "<polyline points=\"{}\" fill=\"none\" stroke=\"#444\" stroke-width=\"1.2\"/>", points.join(" "));
 }
 
+fn ring(out: &mut String, frame: &Frame, earlier: &Standing, now: &Standing) {
+    let (x, y) = (frame.x(earlier.median_um), frame.y(earlier.median_ms));
+    let (to_x, to_y) = (frame.x(now.median_um), frame.y(now.median_ms));
+    let colour = colour(&earlier.knob);
+    let _ = writeln!(
+        out,
+        "<g stroke=\"{colour}\" fill=\"white\" opacity=\"0.7\"><line x1=\"{x:.1}\" y1=\"{y:.1}\" x2=\"{to_x:.1}\" y2=\"{to_y:.1}\" stroke-dasharray=\"2 3\"/>\
+         <circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\"><title>{} before: {:.2} µm, {:.3} ms</title></circle></g>",
+        earlier.name, earlier.median_um, earlier.median_ms
+    );
+}
+
 fn colour(knob: &str) -> &'static str {
     COLOURS.iter().find(|(name, _)| *name == knob).map_or("#000", |(_, colour)| colour)
 }
@@ -208,7 +224,7 @@ fn legend(out: &mut String, y: f64) {
     }
     let _ = writeln!(
         out,
-        "<text x=\"{}\" y=\"{y}\" fill=\"#555\">dot: medians; lines: to the 99th percentiles; tick: largest error; full colour: nobody is both faster and nearer</text>",
+        "<text x=\"{}\" y=\"{y}\" fill=\"#555\">dot: medians; lines: to the 99th percentiles; tick: largest error; full colour: nobody is both faster and nearer; ring: before</text>",
         LEFT + 130.0 * COLOURS.len() as f64
     );
 }
