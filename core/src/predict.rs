@@ -5,7 +5,7 @@
 //! `finite_element` (the levels on meshes), `held` (the interface), `over_fluid` (a bleb), `networks` and `learned` (the learned levels), `choice` (effects), `budget`, `expected_error` and `sampled` (levels),
 //! `indentation` (many steps of one needle). Not here: HTTP, clocks, threads.
 
-mod answer;
+pub(crate) mod answer;
 pub mod beds;
 mod bent;
 pub(crate) mod bond;
@@ -14,12 +14,12 @@ pub mod calibration;
 pub mod choice;
 pub mod expected_error;
 pub mod finite_element;
-mod held;
+pub(crate) mod held;
 pub mod indentation;
 mod learned;
 pub mod linear;
 pub mod networks;
-mod over_fluid;
+pub(crate) mod over_fluid;
 mod question;
 pub mod sampled;
 pub(crate) mod topologies;

@@ -6,7 +6,8 @@
 //! Time runs from 0, when the tissue is at rest under the pressure of its eye; the load of a step is reached at the step's time, linearly from the step before. Without
 //! memory every step is an equilibrium of its own, and the step before is only its start. Memory is of two kinds, and [`Simulation`] carries both from
 //! step to step: of time (`viscoelasticity`, `inertia`), and of the way, however slowly it is gone (`friction`: where the needle holds the tissue; `adhesion`:
-//! how far the bond was torn).
+//! how far the bond was torn). Fluid under the retina is a load like the needle: a step says how much there is of it at its time, and before the first the tissue has been at rest over what the
+//! scene has of it.
 //!
 //! Where the mesh stands: a mesh as coarse as `coarse` answers well only for the contact that it was made for (a contact of half the radius is off by a
 //! third of its motion). So without memory a step keeps the mesh, and starts from the step before, while its expected contact stays within
@@ -16,11 +17,12 @@
 //! warning that says by how much.
 //!
 //! Read on in `plan` (every step checked before the first is computed), `rates` (which effects of time are called for), `history` and `bond` (what is
-//! remembered), `advance` (one step), `worst` (what a step calls for), `cut` (a step in parts). Not here: clocks, threads, the wire.
+//! remembered), `advance` (one step), `worst` (what a step calls for), `cut` (a step in parts), `fluid` (what is under the retina). Not here: clocks, threads, the wire.
 
 mod advance;
 mod bond;
 mod cut;
+mod fluid;
 mod history;
 mod plan;
 mod rates;
@@ -35,12 +37,14 @@ use crate::equilibrium::MeshSize;
 use crate::mesh::wall::WallTopology;
 use crate::needle::{Body, Needle};
 use crate::patch::Patch;
+use crate::predict::answer::resolved;
 use crate::predict::choice::Decision;
 use crate::predict::finite_element::{COARSE, ContactEstimate, REFERENCE, Resolution};
 use crate::predict::topologies::shared_topology;
 use crate::predict::{self, EffectChoice, EffectReport, Level, PredictError, Prediction, PreparedScene};
 use crate::progress::Progress;
 use crate::range::ParameterRange;
+use crate::scene::bleb::Filling;
 use crate::solve::newton;
 use history::History;
 use plan::Plan;
@@ -73,6 +77,8 @@ pub struct Step {
     /// The needle advances along this force (mN) until the tissue's reaction along it equals the force; zero withdraws it. `None`: it
     /// stays where it is, and the reaction is the answer.
     pub force_mn: Option<Vector3<f64>>,
+    /// What there is of the fluid under the retina at the step's time, on the scene's detached disc: before the first step the scene's own. The disc stays as wide as it is.
+    pub fluid: Option<Filling>,
 }
 
 /// A timed list of needle poses and forces.
@@ -199,6 +205,10 @@ struct State {
     punctured_s: Option<f64>,
     /// What decides about the effects, of the steps so far.
     met: Worst,
+    /// What there is of the fluid, where the scene has a detached disc.
+    filling: Option<Filling>,
+    /// Pressure of the fluid above that in the eye (kPa), where one was found.
+    fluid_kpa: Option<f64>,
 }
 
 /// A needle's motion under way, planned from a sequence.
@@ -250,12 +260,19 @@ impl Simulation {
         let (patch, plan) = plan::plan(prepared, sequence, &body, progress)?;
         let first = |cause| SequenceError::At { step: 0, time_s: sequence.steps[0].time_s, cause };
         let (decision, rates) = rates::decide(prepared, sequence, &plan);
+        let lasts = rates.any() || decision.is_path_dependent();
         let resolution = *resolution.unwrap_or(match sequence.level {
             Level::Reference => &REFERENCE,
             _ if rates.any() || (decision.is_path_dependent() && !plan.is_one_contact) => &LASTING,
             _ => &COARSE,
         });
-        let topology = shared_topology(resolution.division(&prepared.scene().tissue, decision.adhesion))
+        let resolution = resolved(&resolution, &decision);
+        plan.check_over_fluid(&body, &resolution, lasts).map_err(|(step, cause)| SequenceError::At {
+            step,
+            time_s: sequence.steps[step].time_s,
+            cause,
+        })?;
+        let topology = shared_topology(resolution.division(&prepared.scene().tissue, decision.parts()))
             .map_err(|error| first(PredictError::Mesh(error)))?;
         Ok(Simulation {
             prepared: Arc::clone(prepared),
@@ -278,6 +295,8 @@ impl Simulation {
                 history: None,
                 punctured_s: None,
                 met: plan.unpressed,
+                filling: prepared.scene().bleb.map(|fluid| fluid.filling),
+                fluid_kpa: None,
             },
             plan,
         })

@@ -1,17 +1,13 @@
 //! A bleb on whole scenes: its volume is kept, with and without a needle, at every pose; where there is none there is no trace of it.
 
-use std::sync::Arc;
-
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use retina_core::equilibrium::bleb::VOLUME_TOLERANCE;
 use retina_core::predict::{
     ContactState, Control, EffectChoice, EffectReport, Level, PredictError, Prediction, PreparedScene, Request,
 };
-use retina_core::progress::Silent;
 use retina_core::scene::Scene;
 use retina_core::scene::bleb::{Filling, SubretinalFluid};
 use retina_core::scene::conditions::MMHG_KPA;
-use retina_core::sequence::{Sequence, SequenceError, Simulation, Step};
 
 use crate::support::{ask, at, built_in, largest_um, straight};
 
@@ -185,24 +181,6 @@ fn what_a_bleb_cannot_be_is_refused() {
     assert!(ask(&wet, &over).is_ok());
     let names = ["elasticity", "contact"].map(str::to_owned).to_vec();
     assert!(ask(&wet, &Request { effects: EffectChoice::Named(names), ..straight(Level::Coarse, 0.2) }).is_ok());
-    // A sequence says that it has none, and refuses to be asked for one.
-    let wet = Arc::new(filled("flat", fluid(VOLUME_MM3, 0.0, 0.0)));
-    let step = Step { time_s: 1.0, force_mn: Some(Vector3::new(0.0, 0.0, -0.2)), ..Step::default() };
-    let mut sequence = Sequence {
-        needle: straight(Level::Coarse, 0.2).needle,
-        steps: vec![step],
-        level: Level::Coarse,
-        effects: EffectChoice::Auto,
-    };
-    let told = Simulation::new(&wet, &sequence, &mut Silent).unwrap();
-    let row = told.effects().iter().find(|effect| effect.name == "bleb").unwrap();
-    assert!(!row.simulated && row.reason.contains("not simulated in a sequence"), "{row:?}");
-    sequence.effects = EffectChoice::Named(["elasticity", "contact", "bleb"].map(str::to_owned).to_vec());
-    let error = Simulation::new(&wet, &sequence, &mut Silent).err().unwrap();
-    assert!(
-        matches!(&error, SequenceError::At { cause: PredictError::Effect { name, .. }, .. } if name == "bleb"),
-        "{error:?}"
-    );
 }
 
 #[test]

@@ -7,6 +7,7 @@
 
 mod auto;
 mod bleb;
+mod bleb_sequences;
 mod effects;
 mod equilibrium;
 mod frames;

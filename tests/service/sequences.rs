@@ -268,3 +268,67 @@ fn a_drag_with_friction_sticks_slips_and_says_so() {
     let problem: Value = serde_json::from_str(&body).expect("JSON");
     assert_eq!((status, &problem["errors"][0]["field"]), (422, &json!("scene.tissue.bond.rate_exponent")), "{body}");
 }
+
+/// Fluid is injected under the retina, a needle presses it, and it is drawn off.
+pub fn injection() -> Value {
+    json!({
+        "scene": {"surface": {"kind": "flat"}, "bleb": {"volume_mm3": 0.01, "radius_mm": 0.6}},
+        "needle": {"tip_mm": [0.0, 0.0, 0.1]},
+        "steps": [
+            {"time_s": 0.5, "force_mn": [0.0, 0.0, 0.0], "bleb": {"volume_mm3": 0.03}},
+            {"time_s": 1.0, "force_mn": [0.0, 0.0, -0.2]},
+            {"time_s": 1.5, "force_mn": [0.0, 0.0, 0.0], "bleb": {"pressure_kpa": 0.1}},
+            {"time_s": 5.0, "bleb": {"volume_mm3": 0.0}, "force_mn": [0.0, 0.0, 0.0]},
+        ],
+    })
+}
+
+#[test]
+fn fluid_is_injected_pressed_and_drawn_off() {
+    let service = Running::start(&["--threads", "1"]);
+    let (status, _, body) = simulate(&service, &injection());
+    assert_eq!(status, 200, "{body}");
+    let lines = lines(&body);
+    lines.iter().for_each(|line| assert_matches("SimulateLine", line));
+    let told = lines[0]["begin"]["effects"].as_array().expect("list");
+    let simulated = |name: &str| told.iter().any(|effect| effect["name"] == name && effect["simulated"] == true);
+    assert!(simulated("bleb") && simulated("viscoelasticity"), "{told:?}");
+    let fluid = |step: usize, number: &str| lines[step + 1]["step"]["contact"]["bleb"][number].as_f64();
+    let volume = |step: usize| fluid(step, "volume_mm3").expect("fluid");
+    let pressure = |step: usize| fluid(step, "pressure_kpa").expect("fluid");
+    for step in [0, 1] {
+        assert!((volume(step) / 0.03 - 1.0).abs() < 1e-3, "the volume is kept: {body}");
+    }
+    assert!(pressure(1) > pressure(0), "the needle presses on it");
+    assert!((pressure(2) - 0.1).abs() < 1e-9 && volume(2) < volume(1));
+    assert_eq!(fluid(3, "volume_mm3"), None, "nothing is left");
+}
+
+#[test]
+fn fluid_that_cannot_be_is_refused_by_step() {
+    let service = Running::start(&["--threads", "1"]);
+    let cases = [
+        ("/steps/0/bleb", json!({"volume_mm3": 0.6}), "out-of-range", "steps[0].bleb.volume_mm3"),
+        ("/steps/2/bleb", json!({"pressure_kpa": -1}), "out-of-range", "steps[2].bleb.pressure_kpa"),
+        ("/steps/0/bleb", json!({}), "invalid-request", "steps[0].bleb.volume_mm3"),
+        (
+            "/steps/0/bleb",
+            json!({"volume_mm3": 0.1, "pressure_kpa": 1}),
+            "invalid-request",
+            "steps[0].bleb.pressure_kpa",
+        ),
+        ("/steps/0/bleb", json!({"volume_mm3": 0.1, "radius_mm": 1}), "invalid-request", "steps[0].bleb.radius_mm"),
+        ("/scene", json!("macula"), "not-possible", "steps[0].bleb"),
+        ("/scene/bleb/radius_mm", json!(3), "out-of-range", "scene.bleb.radius_mm"),
+        ("/scene/bleb/center_mm", json!([1.5, 0, 0]), "outside-patch", "scene.bleb.center_mm"),
+        ("/steps/1/tip_mm", json!([0.7, 0, 0.1]), "not-possible", "steps[1].tip_mm"),
+    ];
+    for (place, value, kind, field) in cases {
+        let request = with(injection(), place, value);
+        let (status, _, body) = simulate(&service, &request);
+        let problem: Value = serde_json::from_str(&body).expect("a problem");
+        assert!((400..500).contains(&status), "{place}: {status}");
+        assert_eq!(problem["type"], format!("/problems/{kind}"), "{place}: {problem}");
+        assert_eq!(problem["errors"][0]["field"], field, "{place}: {problem}");
+    }
+}

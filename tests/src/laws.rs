@@ -171,6 +171,7 @@ pub fn cause(error: &PredictError) -> (Kind, &'static str) {
         PredictError::Linear(_) => (Failed, "level linear"),
         PredictError::BlebOutsidePatch { .. } => (Refused, "bleb outside the patch"),
         PredictError::BesideBleb { .. } => (Refused, "beside the bleb"),
+        PredictError::NoBleb => (Refused, "no bleb to fill"),
         PredictError::Solver { cause, .. } | PredictError::Bleb { cause, .. } => (Failed, solver(cause)),
     }
 }

@@ -60,6 +60,11 @@ impl Bleb {
         if share < 1.0 { middle_mm(self.volume_mm3, self.radius_mm) * (1.0 - share * share).powi(2) } else { 0.0 }
     }
 
+    /// Whether there is none of it: the disc is detached, and rests on what is below.
+    pub fn is_empty(&self) -> bool {
+        self.volume_mm3 == 0.0
+    }
+
     /// What is held of it, in words.
     pub fn held(&self) -> String {
         match self.keeps_volume {

@@ -362,6 +362,6 @@ impl Question<'_> {
 }
 
 /// How finely what is decided is computed by a level that computes as finely as `resolution`.
-fn resolved(resolution: &Resolution, decision: &Decision) -> Resolution {
+pub(crate) fn resolved(resolution: &Resolution, decision: &Decision) -> Resolution {
     if decision.bleb { resolution.over_fluid() } else { *resolution }
 }

@@ -11,14 +11,20 @@ use crate::equilibrium::Wall;
 /// Strength of a bond that is not simulated to part (kPa): the retina holds outside of a bleb.
 const UNBREAKABLE_KPA: f64 = 1e6;
 /// Such a bond; its energy is twice what it takes to open it to its strength, so that the law stays a law.
-const UNBREAKABLE: Bond = Bond {
+pub(crate) const UNBREAKABLE: Bond = Bond {
     strength_kpa: UNBREAKABLE_KPA,
     fracture_energy_mn_per_mm: UNBREAKABLE_KPA * UNBREAKABLE_KPA / STIFFNESS_KPA_PER_MM,
     stiffness_kpa_per_mm: STIFFNESS_KPA_PER_MM,
 };
 
+/// Largest openings of the past of a bond that is whole but on the faces that are `detached`, for each of their `points`: beyond parting there (mm).
+pub(crate) fn parted_mm(bond: &Bond, detached: &[bool], points: usize) -> Vec<f64> {
+    let largest = |&apart: &bool| std::iter::repeat_n(if apart { 2.0 * bond.parted_mm() } else { 0.0 }, points);
+    detached.iter().flat_map(largest).collect()
+}
+
 /// The interface of one solve.
-pub(super) struct Held {
+pub(crate) struct Held {
     interface: Interface,
     bond: Bond,
     /// Largest openings of the past: none, or beyond parting inside of a bleb (mm).
@@ -40,9 +46,7 @@ impl Held {
             Some(bleb) => wall.detached(bleb),
             None => vec![false; stencils.len()],
         };
-        let largest =
-            |&apart: &bool| std::iter::repeat_n(if apart { 2.0 * bond.parted_mm() } else { 0.0 }, interface.points());
-        let largest_mm = detached.iter().flat_map(largest).collect();
+        let largest_mm = parted_mm(&bond, &detached, interface.points());
         Some(Held { interface, bond, largest_mm, detached })
     }
 
@@ -73,7 +77,7 @@ impl Held {
 
 impl Problem<'_> {
     /// What the answer tells of the fluid at `positions`: its pressure counts from that in the eye.
-    pub(super) fn told_of(&self, fluid: &Fluid, wall: &Wall, positions: &[f64]) -> BlebReport {
+    pub(crate) fn told_of(&self, fluid: &Fluid, wall: &Wall, positions: &[f64]) -> BlebReport {
         BlebReport {
             pressure_kpa: fluid.pressure_kpa() - self.pressure_kpa.unwrap_or_default(),
             volume_mm3: wall.fluid_volume_mm3(fluid, positions),

@@ -14,6 +14,7 @@ use crate::equilibrium::Motion;
 use crate::equilibrium::bleb::{Bleb, compliance, middle_mm};
 use crate::equilibrium::error::EquilibriumError;
 use crate::mesh::disc::DiscGeometry;
+use crate::needle::Body;
 use crate::progress::Progress;
 use crate::scene::bleb::{Filling, SubretinalFluid};
 use crate::solve::newton::Workspace;
@@ -37,24 +38,34 @@ impl PreparedScene {
         }
     }
 
-    /// What is decided of the scene's fluid.
-    pub(crate) fn lifting(&self, choice: &EffectChoice, level: Level) -> EffectReport {
-        let fluid = self.scene().bleb.as_ref().filter(|fluid| !fluid.is_empty());
+    /// Volume of what fills the scene's detached disc, that expected of a flat bleb where the pressure is given (mm³); 0 where there is no disc.
+    pub(crate) fn volume_mm3(&self, filling: Filling) -> f64 {
+        self.scene().bleb.map_or(0.0, |fluid| self.volume_and_pressure(&SubretinalFluid { filling, ..fluid }).0)
+    }
+
+    /// What is decided of this fluid.
+    fn lifting(&self, fluid: Option<&SubretinalFluid>, choice: &EffectChoice, level: Level) -> EffectReport {
+        let fluid = fluid.filter(|fluid| !fluid.is_empty());
         let rise_um = |fluid: &SubretinalFluid| middle_mm(self.volume_and_pressure(fluid).0, fluid.radius_mm) * 1e3;
         choice::bleb::report(choice, level, fluid.map(rise_um))
     }
 }
 
 impl Question<'_> {
-    /// What is decided of the scene's fluid at `level`.
+    /// What is decided of the fluid at `level`.
     pub(super) fn lifting(&self, level: Level) -> EffectReport {
-        self.prepared.lifting(&self.request.effects, level)
+        self.prepared.lifting(self.fluid.as_ref(), &self.request.effects, level)
     }
 
-    /// The scene's fluid, in patch parameters.
-    pub(super) fn bleb(&self) -> Option<Bleb> {
+    /// The fluid, in patch parameters.
+    pub(crate) fn bleb(&self) -> Option<Bleb> {
+        self.bleb_with(self.fluid?.filling)
+    }
+
+    /// The fluid that would be there with this filling, in patch parameters.
+    pub(crate) fn bleb_with(&self, filling: Filling) -> Option<Bleb> {
         let frame = self.patch().scene_from_patch;
-        self.prepared.scene().bleb.map(|fluid| {
+        self.fluid.map(|fluid| SubretinalFluid { filling, ..fluid }).map(|fluid| {
             let center = frame.inverse_transform_point(&fluid.center_mm);
             let (volume_mm3, pressure_kpa) = self.prepared.volume_and_pressure(&fluid);
             Bleb {
@@ -68,7 +79,7 @@ impl Question<'_> {
     }
 
     /// Refuses a bleb that is called for and whose centre is not under the patch.
-    pub(super) fn check_bleb(&self) -> Result<(), PredictError> {
+    pub(crate) fn check_bleb(&self) -> Result<(), PredictError> {
         let lifted = self.lifting(Level::Coarse).simulated;
         let Some(Bleb { center: [x_mm, y_mm], .. }) = self.bleb().filter(|_| lifted) else { return Ok(()) };
         let limit_mm = self.patch().parameters.iter().flatten().fold(0.0_f64, |limit, c| limit.max(c.abs()));
@@ -98,13 +109,7 @@ impl Question<'_> {
         let mut bench =
             Bench { level: level.name(), resolution: &resolution, topology: &topology, workspace: &mut solver };
         let direction = problem.tool.patch_from_needle.rotation * -Vector3::z_axis();
-        let away = ContactEstimate {
-            center: bleb.center,
-            radius_mm: CORE_PER_BLEB * bleb.radius_mm,
-            touch_mm: -WITHDRAWN_MM,
-            travel_mm: -WITHDRAWN_MM,
-            deflection: Vector3::zeros(),
-        };
+        let away = untouched(&bleb, -WITHDRAWN_MM);
         let motion = Motion { direction, force_mn: None, travel_mm: -WITHDRAWN_MM };
         let problem = Problem { motion, friction_coefficient: None, ..problem };
         let mut answer = problem.solve(&mut bench, &away, &|_, _| Vector3::zeros(), progress)?;
@@ -126,28 +131,48 @@ impl Question<'_> {
 
 impl Problem<'_> {
     /// The error of a solve without an equilibrium.
-    pub(super) fn failed(&self, level: &'static str, cause: EquilibriumError) -> PredictError {
+    pub(crate) fn failed(&self, level: &'static str, cause: EquilibriumError) -> PredictError {
         match &self.bleb {
             Some(bleb) if !cause.is_interrupted() => PredictError::Bleb { level, held: bleb.held(), cause },
             _ => PredictError::Solver { level, cause },
         }
     }
 
-    /// Refuses a contact that is not over the fluid: a mesh around it would not resolve the edge of the bleb.
-    pub(super) fn check_on_bleb(
+    /// Refuses a contact that is not over the fluid ([`check_over`]).
+    pub(crate) fn check_on_bleb(
         &self,
         resolution: &Resolution,
         estimate: &ContactEstimate,
     ) -> Result<(), PredictError> {
-        let Some(bleb) = &self.bleb else { return Ok(()) };
-        let contact = estimate.radius_mm.max(SMALLEST_CONTACT * self.tool.body.radius_mm());
-        let core_mm = resolution.core_per_contact * contact;
-        let away_mm = (estimate.center[0] - bleb.center[0]).hypot(estimate.center[1] - bleb.center[1]);
-        let most_mm = CORE_IN_BLEB * bleb.radius_mm;
-        if away_mm + core_mm <= most_mm {
-            return Ok(());
-        }
-        Err(PredictError::BesideBleb { core_mm, away_mm, radius_mm: bleb.radius_mm, most_mm })
+        self.bleb.as_ref().map_or(Ok(()), |bleb| check_over(bleb, self.tool.body, resolution, estimate))
+    }
+}
+
+/// Refuses a contact of `body` that is not over the fluid: a mesh around it would not resolve the edge of the bleb.
+pub(crate) fn check_over(
+    bleb: &Bleb,
+    body: &Body,
+    resolution: &Resolution,
+    estimate: &ContactEstimate,
+) -> Result<(), PredictError> {
+    let contact = estimate.radius_mm.max(SMALLEST_CONTACT * body.radius_mm());
+    let core_mm = resolution.core_per_contact * contact;
+    let away_mm = (estimate.center[0] - bleb.center[0]).hypot(estimate.center[1] - bleb.center[1]);
+    let most_mm = CORE_IN_BLEB * bleb.radius_mm;
+    if away_mm + core_mm <= most_mm {
+        return Ok(());
+    }
+    Err(PredictError::BesideBleb { core_mm, away_mm, radius_mm: bleb.radius_mm, most_mm })
+}
+
+/// Stands for the contact of a needle that does not press, `travel_mm` along its way: the mesh is then laid around the middle of the bleb.
+pub(crate) fn untouched(bleb: &Bleb, travel_mm: f64) -> ContactEstimate {
+    ContactEstimate {
+        center: bleb.center,
+        radius_mm: CORE_PER_BLEB * bleb.radius_mm,
+        touch_mm: travel_mm,
+        travel_mm,
+        deflection: Vector3::zeros(),
     }
 }
 

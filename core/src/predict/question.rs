@@ -16,6 +16,7 @@ use crate::equilibrium::{Motion, Solid, Tool};
 use crate::needle::Body;
 use crate::patch::Patch;
 use crate::scene::Scene;
+use crate::scene::bleb::{Filling, SubretinalFluid};
 
 /// A grid's patch is the scene's, a cut one the request's own.
 pub(crate) enum CutOrGrid<'a> {
@@ -47,6 +48,8 @@ pub(crate) struct Question<'a> {
     patch: CutOrGrid<'a>,
     pub(crate) tool: Tool<'a>,
     pub(crate) motion: Motion,
+    /// Fluid under the retina: the scene's, unless a sequence has changed how much there is of it.
+    pub(super) fluid: Option<SubretinalFluid>,
 }
 
 impl<'a> Question<'a> {
@@ -64,7 +67,16 @@ impl<'a> Question<'a> {
                 Motion { direction: patch_from_needle.rotation * -Vector3::z_axis(), force_mn: None, travel_mm: 0.0 }
             }
         };
-        Question { prepared, request, patch, tool: Tool { body, patch_from_needle, stiffness_mn_per_mm: None }, motion }
+        let tool = Tool { body, patch_from_needle, stiffness_mn_per_mm: None };
+        Question { prepared, request, patch, tool, motion, fluid: prepared.scene().bleb }
+    }
+
+    /// The same with so much fluid on the scene's detached disc, where that is not the scene's own amount.
+    pub(crate) fn filled(mut self, filling: Option<Filling>) -> Self {
+        if let (Some(fluid), Some(filling)) = (&mut self.fluid, filling) {
+            fluid.filling = filling;
+        }
+        self
     }
 }
 
@@ -77,6 +89,7 @@ pub(super) enum Begun<'a> {
 }
 
 /// What the eye's pressure and fluid under the retina do by themselves.
+#[derive(Clone)]
 pub(crate) struct Sink {
     /// The decision about the effect.
     pub(crate) report: EffectReport,
@@ -143,10 +156,14 @@ impl Question<'_> {
 
     /// What the eye's pressure and fluid under the retina do by themselves.
     pub(super) fn sink(&self) -> Sink {
-        let mut sink = self.sink_without_fluid();
-        sink.bleb = self.bleb().filter(|_| self.lifting(self.request.level).simulated);
-        sink.expected_mm += sink.bleb.map_or(0.0, |bleb| bleb.expected_rise_mm(bleb.center));
-        sink
+        self.with_fluid(self.sink_without_fluid())
+    }
+
+    /// `dry` with what the fluid does besides.
+    pub(crate) fn with_fluid(&self, dry: Sink) -> Sink {
+        let bleb = self.bleb().filter(|_| self.lifting(self.request.level).simulated);
+        let rise_mm = bleb.map_or(0.0, |bleb| bleb.expected_rise_mm(bleb.center));
+        Sink { bleb, expected_mm: dry.expected_mm + rise_mm, ..dry }
     }
 
     /// What the eye's pressure does by itself.

@@ -330,6 +330,9 @@ pub enum PredictError {
         /// Largest sum of the first two (mm).
         most_mm: f64,
     },
+    /// A step tells of fluid under the retina of a scene where nothing is detached.
+    #[error("a step has fluid under the retina, and the scene has no detached disc for it (`scene.bleb`)")]
+    NoBleb,
     /// The equilibrium with fluid under the retina was not found.
     #[error("no equilibrium at level `{level}` with `bleb` ({held}): {cause}")]
     Bleb {

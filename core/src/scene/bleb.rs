@@ -48,6 +48,28 @@ pub enum Filling {
     Pressure(f64),
 }
 
+impl Filling {
+    /// Holds the number against its range.
+    ///
+    /// # Errors
+    /// [`OutOfRange`].
+    pub fn validate(&self) -> Result<(), OutOfRange> {
+        match *self {
+            Filling::Volume(volume_mm3) => VOLUME.check("bleb.volume_mm3", volume_mm3),
+            Filling::Pressure(pressure_kpa) => PRESSURE.check("bleb.pressure_kpa", pressure_kpa),
+        }
+    }
+
+    /// Halfway from here to `end`; `end` where that is another measure.
+    pub fn halfway(self, end: Filling) -> Filling {
+        match (self, end) {
+            (Filling::Volume(start), Filling::Volume(end)) => Filling::Volume(0.5 * (start + end)),
+            (Filling::Pressure(start), Filling::Pressure(end)) => Filling::Pressure(0.5 * (start + end)),
+            (_, end) => end,
+        }
+    }
+}
+
 /// Fluid between retina and choroid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SubretinalFluid {
@@ -62,10 +84,7 @@ pub struct SubretinalFluid {
 impl SubretinalFluid {
     /// Holds every number against its range; fails with the first that is outside.
     pub fn validate(&self) -> Result<(), OutOfRange> {
-        match self.filling {
-            Filling::Volume(volume_mm3) => VOLUME.check("bleb.volume_mm3", volume_mm3)?,
-            Filling::Pressure(pressure_kpa) => PRESSURE.check("bleb.pressure_kpa", pressure_kpa)?,
-        }
+        self.filling.validate()?;
         RADIUS.check("bleb.radius_mm", self.radius_mm)?;
         for (index, &coordinate) in self.center_mm.coords.iter().enumerate() {
             TIP_COORDINATE.check(&format!("bleb.center_mm[{index}]"), coordinate)?;

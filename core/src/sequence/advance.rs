@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::fluid::{check_filling, poured};
 use super::history::History;
 use super::plan::{fits, outside, pressed};
 use super::{Laid, Settled, Simulation, Step};
@@ -17,7 +18,9 @@ use crate::equilibrium::{Addition, Equilibrium, Load, MeshSize, Motion, Wall};
 use crate::mesh::wall::Place;
 use crate::predict::expected_error::ExpectedError;
 use crate::predict::finite_element::{COARSE, ContactEstimate, Problem};
+use crate::predict::held::Held;
 use crate::predict::linear::LinearAnswer;
+use crate::predict::over_fluid::untouched;
 use crate::predict::{ContactState, CutOrGrid, Level, PredictError, Prediction, Question};
 use crate::progress::Progress;
 
@@ -42,15 +45,20 @@ impl Simulation {
         progress: &mut dyn Progress,
     ) -> Result<(Prediction, bool), PredictError> {
         progress.stage("linear");
+        check_filling(&self.prepared, step.fluid)?;
         let request = self.sequence.request(step, &self.state.needle);
         request.needle.validate()?;
+        let filling = step.fluid.or(self.state.filling);
         // Taken out so that the question may borrow them while the rest changes.
         let (prepared, body, patch) = (Arc::clone(&self.prepared), self.body, self.patch.clone());
-        let question = Question::new(&prepared, &request, &body, CutOrGrid::Grid(&patch));
-        let linear = pressed(&question, &self.plan.sink)?;
+        let question = Question::new(&prepared, &request, &body, CutOrGrid::Grid(&patch)).filled(filling);
+        let linear = pressed(&question, &question.with_fluid(self.plan.dry.clone()))?;
         let (met, unforeseen) = self.met(&question, linear.as_ref())?;
-        let (mut prediction, laid) = if self.decision.contact && (linear.is_some() || self.is_strained(&question)) {
-            self.solve(&question, linear.as_ref(), step.time_s - self.state.time_s, progress)?
+        let linear = linear.filter(|_| self.decision.contact);
+        let moves = linear.is_some() || self.is_strained(&question);
+        let (mut prediction, laid) = if moves && (self.decision.contact || self.decision.bleb) {
+            let unmoved = filling == self.state.filling && self.unmoved(&question);
+            self.solve(&question, linear.as_ref(), unmoved, step.time_s - self.state.time_s, progress)?
         } else {
             self.state.settled = None;
             let why = match (self.decision.contact, question.motion.force_mn) {
@@ -61,7 +69,7 @@ impl Simulation {
             if let Some(history) = &mut self.state.history {
                 history.grip = Grip::default();
             }
-            (question.at_rest(self.decision.clone(), self.plan.sink.change_kpa, why), false)
+            (question.at_rest(self.decision.clone(), self.plan.dry.change_kpa, why), false)
         };
         self.state.met = met;
         prediction.warnings.extend(unforeseen);
@@ -69,6 +77,7 @@ impl Simulation {
         // What is handed on is the guide's place, where a needle without a load would be.
         self.state.needle.tip_mm = prediction.needle.tip_mm - prediction.needle.deflection_mm.unwrap_or_default();
         self.state.needle.orientation = request.needle.orientation;
+        self.state.filling = filling;
         Ok((prediction, laid))
     }
 
@@ -90,7 +99,7 @@ impl Simulation {
     fn is_strained(&self, question: &Question) -> bool {
         let withdrawn = question.motion.force_mn == Some(0.0);
         let kept = |history: &History| history.damage() > Some(0.0) || (history.grip.holds() && !withdrawn);
-        self.rates.any() || self.state.history.as_ref().is_some_and(kept)
+        self.rates.any() || self.decision.bleb || self.state.history.as_ref().is_some_and(kept)
     }
 
     /// Whether the needle is held where the step before left it.
@@ -108,20 +117,26 @@ impl Simulation {
         question: &Question,
         linear: Option<&LinearAnswer>,
         problem: &Problem,
+        unmoved: bool,
         progress: &mut dyn Progress,
     ) -> Result<Aim, PredictError> {
         let contact = linear.map(|linear| question.estimate(linear, self.decision.tool_flex));
+        if let Some(contact) = &contact {
+            problem.check_on_bleb(&self.resolution, contact)?;
+        }
         let remembers = self.remembers();
-        let fitting = |mesh: &ContactEstimate| contact.as_ref().is_none_or(|contact| fits(mesh, contact));
-        let kept = self.state.laid.clone().filter(|laid| remembers || self.unmoved(question) || fitting(&laid.contact));
+        // Fluid that no needle presses has a mesh of its own, as in a single prediction.
+        let own = contact.or(problem.bleb.map(|bleb| untouched(&bleb, 0.0)));
+        let fitting = |mesh: &ContactEstimate| own.as_ref().is_none_or(|own| fits(mesh, own));
+        let kept = self.state.laid.clone().filter(|laid| remembers || unmoved || fitting(&laid.contact));
         let laid = match &kept {
             Some(laid) => laid.clone(),
             None => {
                 let planned = self.plan.around.clone().filter(|_| remembers);
-                let (mut around, warning) = planned.or(contact.map(|own| (own, None))).unwrap_or((NO_CONTACT, None));
+                let (mut around, warning) = planned.or(own.map(|own| (own, None))).unwrap_or((NO_CONTACT, None));
                 if let (Level::Reference, Some(linear)) = (question.request.level, linear.filter(|_| !remembers)) {
                     // The finer mesh is made for the contact that `coarse` finds, as in a single prediction.
-                    let change_kpa = self.plan.sink.change_kpa;
+                    let change_kpa = self.plan.dry.change_kpa;
                     let found = question
                         .coarse(&COARSE, linear, &self.decision, change_kpa, &mut self.coarse, progress)?
                         .estimate;
@@ -141,20 +156,41 @@ impl Simulation {
         &mut self,
         question: &Question,
         linear: Option<&LinearAnswer>,
+        unmoved: bool,
         step_s: f64,
         progress: &mut dyn Progress,
     ) -> Result<(Prediction, bool), PredictError> {
-        let problem = question.problem(&self.decision, self.plan.sink.change_kpa);
-        let aim = self.aim(question, linear, &problem, progress)?;
+        let change_kpa = self.plan.dry.change_kpa;
+        let mut problem = question.problem(&self.decision, change_kpa);
+        // The pressure that keeps a volume is sought from that of the step before.
+        if let Some((bleb, before_kpa)) =
+            problem.bleb.as_mut().filter(|bleb| bleb.keeps_volume).zip(self.state.fluid_kpa)
+        {
+            bleb.pressure_kpa = before_kpa;
+        }
+        let problem = problem;
+        let aim = self.aim(question, linear, &problem, unmoved, progress)?;
         progress.stage("mesh");
         let topology = self.topology.clone();
         let wall = problem.wall(&topology, &self.resolution, &aim.size)?;
         let pressure = problem.pressure_kpa.map(|pressure_kpa| Pressure { pressure_kpa });
-        let pressing: Vec<Addition> = pressure.iter().map(|effect| Addition { effect, place: Place::Faces }).collect();
+        let detached = problem.bleb.map_or_else(Vec::new, |bleb| wall.detached(&bleb));
+        let mut pressing: Vec<Addition> =
+            pressure.iter().map(|effect| Addition { effect, place: Place::Faces }).collect();
         if self.remembers() && self.state.history.is_none() {
-            self.state.history = Some(self.begin(&wall, &pressing, progress)?);
+            let bleb = self.state.filling.and_then(|filling| question.bleb_with(filling));
+            let resting =
+                Problem { bleb: bleb.filter(|_| self.decision.bleb), ..question.problem(&self.decision, change_kpa) };
+            let rested = resting.wall(&topology, &self.resolution, &aim.size)?;
+            self.state.history = Some(self.begin(&resting, &rested, &pressing, &detached, progress)?);
         }
-        let withdrawn = question.motion.force_mn == Some(0.0);
+        // Where nothing is remembered, the retina is held as in a single prediction.
+        let held = if self.state.history.is_none() { Held::new(&problem, &wall) } else { None };
+        let adhesion = held.as_ref().map(Held::adhesion);
+        let fluid = poured(&problem, &detached);
+        pressing.extend(adhesion.iter().map(|effect| Addition { effect, place: Place::Interface }));
+        pressing.extend(fluid.iter().map(|effect| Addition { effect, place: Place::Interface }));
+        let withdrawn = question.motion.force_mn == Some(0.0) || !self.decision.contact;
         let (motion, touch_mm) = match &aim.contact {
             Some(contact) => problem.aimed(&wall, &self.resolution, contact),
             None => {
@@ -169,11 +205,12 @@ impl Simulation {
         };
         let deflection = aim.contact.map_or_else(Vector3::zeros, |contact| contact.deflection);
         wall.place_tip(&mut expected, &(motion.direction.into_inner() * motion.travel_mm + deflection));
-        let start = self.start(&expected, &motion, self.unmoved(question));
+        let start = self.start(&expected, &motion, unmoved);
         progress.stage("equilibrium");
         let coefficient = problem.friction_coefficient.filter(|_| !withdrawn);
         let load = Load { motion: &motion, touch_mm, additions: &pressing };
-        let (equilibrium, rubbing, grip) = self.balance(&wall, &load, coefficient, step_s, start, progress)?;
+        let (equilibrium, rubbing, grip) =
+            self.balance(&problem, &wall, &load, coefficient, step_s, start, progress)?;
         if let Some(history) = &mut self.state.history {
             history.commit(&wall, &equilibrium.positions, grip, step_s);
         }
@@ -182,7 +219,10 @@ impl Simulation {
         if let Some(rubbing) = &rubbing {
             answer.contact.rub(rubbing);
         }
-        answer.contact.bond_damage = self.state.history.as_ref().and_then(History::damage);
+        answer.contact.bond_damage =
+            self.state.history.as_ref().filter(|_| self.decision.adhesion).and_then(History::damage);
+        answer.contact.bleb = fluid.map(|fluid| problem.told_of(&fluid, &wall, &equilibrium.positions));
+        self.state.fluid_kpa = answer.contact.bleb.map(|bleb| bleb.pressure_kpa);
         if withdrawn {
             (answer.travel_mm, answer.deflection) = (0.0, None);
         } else {
@@ -200,16 +240,21 @@ impl Simulation {
         Ok((prediction, aim.laid))
     }
 
-    /// Tissue that has been at rest for long, on the mesh of `wall`: under the pressure of the eye, if it has changed and anything depends on the rate at which the tissue leaves it.
+    /// Tissue that has been at rest for long, on the mesh of `wall`: over fluid, and under the pressure of the eye, if it has changed and anything depends on the rate at which the
+    /// tissue leaves it.
     fn begin(
         &mut self,
+        problem: &Problem,
         wall: &Wall,
         pressing: &[Addition],
+        detached: &[bool],
         progress: &mut dyn Progress,
     ) -> Result<History, PredictError> {
         let tissue = &self.prepared.scene().tissue;
-        let mut history = History::at_rest(self.rates, &self.decision, tissue, wall.topology(), &wall.geometry.rest);
-        if self.rates.any() && !pressing.is_empty() {
+        let rest = &wall.geometry.rest;
+        let mut history = History::at_rest(self.rates, &self.decision, tissue, wall.topology(), rest, detached);
+        let fluid = poured(problem, detached);
+        if fluid.is_some() || (self.rates.any() && !pressing.is_empty()) {
             progress.stage("equilibrium");
             let motion = Motion { direction: Vector3::z_axis(), force_mn: None, travel_mm: WITHDRAWN_MM };
             let mut start = wall.start();
@@ -217,18 +262,21 @@ impl Simulation {
             let bond = history.bond(f64::INFINITY);
             let mut additions = pressing.to_vec();
             additions.extend(bond.as_ref().map(|effect| Addition { effect, place: Place::Interface }));
+            additions.extend(fluid.iter().map(|effect| Addition { effect, place: Place::Interface }));
             let load = Load { motion: &motion, touch_mm: WITHDRAWN_MM, additions: &additions };
             let settled = wall
                 .solve(&load, start, &mut self.solver, progress)
-                .map_err(|cause| PredictError::Solver { level: self.sequence.level.name(), cause })?;
+                .map_err(|cause| problem.failed(self.sequence.level.name(), cause))?;
             history.settle(wall, &settled.positions);
         }
         Ok(history)
     }
 
     /// The equilibrium of a step of `step_s` (s), how it rubs, and the grip that it leaves.
+    #[allow(clippy::too_many_arguments)]
     fn balance(
         &mut self,
+        problem: &Problem,
         wall: &Wall,
         load: &Load,
         coefficient: Option<f64>,
@@ -258,7 +306,7 @@ impl Simulation {
             None => solve(load.additions),
         };
         let level = self.sequence.level.name();
-        found.map_err(|cause| PredictError::Solver { level, cause })
+        found.map_err(|cause| problem.failed(level, cause))
     }
 
     /// Positions to start from.

@@ -7,6 +7,7 @@ use crate::effects::adhesion::{Adhesion, Bond, Interface};
 use crate::equilibrium::Wall;
 use crate::mesh::wall::WallTopology;
 use crate::predict::bond::simulated_bond;
+use crate::predict::held::{UNBREAKABLE, parted_mm};
 use crate::tissue::RetinalBond;
 
 /// The bond of one mesh.
@@ -20,15 +21,21 @@ pub(super) struct BondMemory {
     present_mm: Vec<f64>,
     /// Power of the speed, and its reference (mm/s).
     rate: (f64, f64),
+    /// Which faces are detached, with fluid between their sides; none of them counts as damage.
+    detached: Vec<bool>,
 }
 
 impl BondMemory {
-    /// A bond that has never been opened, on a mesh whose vertices are at `rest` (mm).
-    pub fn intact(bond: &RetinalBond, topology: &WallTopology, rest: &[f64]) -> Self {
+    /// A bond that has never been opened but on the faces that are `detached` (empty: nowhere), on a mesh whose vertices are at `rest` (mm); `None` in place of the bond is
+    /// one that does not part.
+    pub fn intact(bond: Option<&RetinalBond>, topology: &WallTopology, rest: &[f64], detached: &[bool]) -> Self {
         let interface = Interface::new(&topology.interface, rest);
-        let largest_mm = vec![0.0; interface.points() * topology.interface.len()];
-        let rate = (bond.rate_exponent, bond.reference_speed_mm_per_s);
-        BondMemory { interface, bond: simulated_bond(bond), present_mm: largest_mm.clone(), largest_mm, rate }
+        let rate = bond.map_or((0.0, 1.0), |bond| (bond.rate_exponent, bond.reference_speed_mm_per_s));
+        let bond = bond.map_or(UNBREAKABLE, simulated_bond);
+        let faces = topology.interface.len();
+        let detached = if detached.is_empty() { vec![false; faces] } else { detached.to_vec() };
+        let largest_mm = parted_mm(&bond, &detached, interface.points());
+        BondMemory { present_mm: vec![0.0; largest_mm.len()], interface, bond, largest_mm, rate, detached }
     }
 
     /// The effect of the next step, which takes `step_s` (s); infinite where nothing is fast.
@@ -60,6 +67,8 @@ impl BondMemory {
 
     /// Largest share of the strength that is lost for good anywhere: 0 intact, 1 parted.
     pub fn damage(&self) -> f64 {
-        self.bond.damage(self.largest_mm.iter().copied().fold(0.0, f64::max))
+        let faces = self.largest_mm.chunks_exact(self.interface.points()).zip(&self.detached);
+        let bonded = faces.filter(|(_, detached)| !**detached).flat_map(|(largest_mm, _)| largest_mm);
+        self.bond.damage(bonded.copied().fold(0.0, f64::max))
     }
 }

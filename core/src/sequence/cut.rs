@@ -1,7 +1,7 @@
 //! A step that finds no equilibrium at once is gone in two halves of its time, and each of them again, up to [`MOST_CUTS`] times.
 //!
 //! The load of a step grows linearly from that of the step before ([`Step`]), so its half is known: the needle halfway between its places and orientations, the
-//! force halfway between what the tissue bore along it and what is asked. What is remembered advances with every part, so the parts are the same motion computed
+//! force halfway between what the tissue bore along it and what is asked, half of what fluid comes or goes. What is remembered advances with every part, so the parts are the same motion computed
 //! more finely. Nothing changes where a step is found at once, and without memory a step is an equilibrium of its own that no other can help.
 
 use nalgebra::Vector3;
@@ -77,6 +77,7 @@ impl Simulation {
             tip_mm: step.tip_mm.map(middle),
             orientation: step.orientation.map(|end| self.state.needle.orientation.nlerp(&end, 0.5)),
             force_mn,
+            fluid: step.fluid.map(|end| self.state.filling.map_or(end, |start| start.halfway(end))),
         })
     }
 }
@@ -84,10 +85,12 @@ impl Simulation {
 /// Whether the equilibrium was not found, and might be by smaller parts.
 fn is_unsettled(failure: &PredictError) -> bool {
     match failure {
-        PredictError::Solver { cause: EquilibriumError::Newton(cause), .. } => {
-            matches!(cause, NewtonError::NotConverged { .. } | NewtonError::NoStep { .. })
-        }
-        PredictError::Solver { cause: EquilibriumError::NotSettled { .. } | EquilibriumError::Torn { .. }, .. } => true,
+        PredictError::Solver { cause, .. } | PredictError::Bleb { cause, .. } => match cause {
+            EquilibriumError::Newton(cause) => {
+                matches!(cause, NewtonError::NotConverged { .. } | NewtonError::NoStep { .. })
+            }
+            EquilibriumError::NotSettled { .. } | EquilibriumError::Torn { .. } => true,
+        },
         _ => false,
     }
 }

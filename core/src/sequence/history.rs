@@ -27,8 +27,16 @@ pub(super) struct History {
 }
 
 impl History {
-    /// Tissue that has been at rest for long.
-    pub fn at_rest(rates: Rates, decision: &Decision, tissue: &Tissue, topology: &WallTopology, rest: &[f64]) -> Self {
+    /// Tissue that has been at rest for long, its retina detached on these faces of the interface.
+    pub fn at_rest(
+        rates: Rates,
+        decision: &Decision,
+        tissue: &Tissue,
+        topology: &WallTopology,
+        rest: &[f64],
+        detached: &[bool],
+    ) -> Self {
+        let bond = decision.adhesion.then_some(&tissue.bond);
         let layers = tissue.layers();
         let shear = |&layer: &usize| match layers[layer].kind {
             LayerKind::Retina(_) => layers[layer].layer.shear_modulus_kpa(),
@@ -40,7 +48,7 @@ impl History {
             momentum: rates.inertia.then(|| Momentum::at_rest(rest.to_vec())),
             density_kg_per_mm3: vec![tissue.rate.density_kg_per_mm3; topology.elements.len()],
             drag_kpa_s_per_mm: tissue.rate.vitreous_drag_kpa_s_per_mm,
-            bond: decision.adhesion.then(|| BondMemory::intact(&tissue.bond, topology, rest)),
+            bond: decision.parts().then(|| BondMemory::intact(bond, topology, rest, detached)),
             grip: Grip::default(),
         }
     }

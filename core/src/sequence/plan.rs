@@ -5,15 +5,16 @@
 
 use nalgebra::Vector3;
 
+use super::fluid::{check_filling, fullest};
 use super::worst::Worst;
 use super::{Sequence, SequenceError, Step, check_time};
-use crate::effects::bleb;
+use crate::equilibrium::bleb::Bleb;
 use crate::needle::{Body, Needle};
 use crate::patch::Patch;
 use crate::predict::choice::{Decision, Expected};
 use crate::predict::finite_element::ContactEstimate;
 use crate::predict::linear::LinearAnswer;
-use crate::predict::{Control, CutOrGrid, EffectChoice, PredictError, PreparedScene, Question, Request, Sink};
+use crate::predict::{Control, CutOrGrid, PredictError, PreparedScene, Question, Request, Sink};
 use crate::progress::Progress;
 use crate::solve::newton::NewtonError;
 
@@ -32,7 +33,11 @@ pub(super) struct Plan {
     /// What is decided of every effect but those of rate.
     pub decision: Decision,
     /// What the eye's pressure does by itself.
-    pub sink: Sink,
+    pub dry: Sink,
+    /// The fluid at its fullest, where it is simulated.
+    pub bleb: Option<Bleb>,
+    /// The contact of every step that presses, with the step's index.
+    pub contacts: Vec<(usize, ContactEstimate)>,
     /// The shortest time in which the load changes between two steps (s); infinite if it never does.
     pub fastest_change_s: f64,
 }
@@ -46,16 +51,17 @@ const LARGEST_REACH: f64 = 1.25;
 const WIDEST_ZONE: f64 = 2.0;
 
 /// The contact in the middle of all contacts, as wide as all together, and what the caller should know of a mesh laid around it.
-fn middle(contacts: &[ContactEstimate]) -> Option<(ContactEstimate, Option<String>)> {
-    let largest = contacts.iter().copied().reduce(|a, b| if b.radius_mm > a.radius_mm { b } else { a })?;
+fn middle(contacts: &[(usize, ContactEstimate)]) -> Option<(ContactEstimate, Option<String>)> {
+    let contacts = contacts.iter().map(|(_, contact)| contact);
+    let largest = contacts.clone().copied().reduce(|a, b| if b.radius_mm > a.radius_mm { b } else { a })?;
     let center = [0, 1].map(|k| {
-        let (low, high) = contacts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), contact| {
+        let (low, high) = contacts.clone().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), contact| {
             (low.min(contact.center[k]), high.max(contact.center[k]))
         });
         0.5 * (low + high)
     });
     let middle = ContactEstimate { center, ..largest };
-    let radius_mm = contacts.iter().map(|contact| reach_mm(&middle, contact)).fold(0.0, f64::max);
+    let radius_mm = contacts.map(|contact| reach_mm(&middle, contact)).fold(0.0, f64::max);
     let warning = (radius_mm > WIDEST_ZONE * largest.radius_mm).then(|| {
         format!(
             "the contacts wander over {radius_mm:.3} mm around the middle of the mesh, which is coarse for contacts of {:.3} mm radius",
@@ -136,17 +142,24 @@ pub(super) fn plan(
         SequenceError::At { step: index, time_s, cause }
     };
     sequence.needle.validate().map_err(|error| at(0, error.into()))?;
+    for (index, step) in sequence.steps.iter().enumerate() {
+        check_filling(prepared, step.fluid).map_err(|cause| at(index, cause))?;
+    }
     let request = sequence.request(first, &sequence.needle);
     let patch = prepared.patch_for(&request, body).map_err(|cause| at(0, cause))?.into_patch();
     let first = Question::new(prepared, &request, body, CutOrGrid::Grid(&patch));
-    let sink = first.sink_without_fluid();
+    let first = first.filled(fullest(prepared, &sequence.steps));
+    first.check_bleb().map_err(|cause| at(0, cause))?;
+    let dry = first.sink_without_fluid();
+    let sink = first.with_fluid(dry.clone());
     let unpressed = Worst::unpressed(first.unpressed(&sink));
     let mut worst = unpressed;
     let mut contacts = Vec::new();
     let mut fastest_change_s = f64::INFINITY;
     let mut is_held = false;
     let mut needle = sequence.needle;
-    let (mut before_s, mut load_before) = (0.0, None);
+    let mut filling = prepared.scene().bleb.map(|fluid| fluid.filling);
+    let (mut before_s, mut load_before) = (0.0, (None, filling));
     for (index, step) in sequence.steps.iter().enumerate() {
         if progress.interrupted() {
             let cause = NewtonError::Interrupted { iterations: 0 }.into();
@@ -154,7 +167,9 @@ pub(super) fn plan(
         }
         let request = sequence.request(step, &needle);
         request.needle.validate().map_err(|error| at(index, error.into()))?;
-        let question = Question::new(prepared, &request, body, CutOrGrid::Grid(&patch));
+        filling = step.fluid.or(filling);
+        let question = Question::new(prepared, &request, body, CutOrGrid::Grid(&patch)).filled(filling);
+        let sink = question.with_fluid(dry.clone());
         let linear = pressed(&question, &sink).map_err(|cause| at(index, cause))?;
         needle = request.needle;
         if let (Some(linear), Some(_)) = (&linear, step.force_mn) {
@@ -163,37 +178,21 @@ pub(super) fn plan(
         }
         is_held |= step.force_mn.is_none() && linear.is_some();
         worst.meet(&question, linear.as_ref(), &sink);
-        let load = linear.as_ref().map(|linear| (linear.depth_mm, linear.center));
+        let load = (linear.as_ref().map(|linear| (linear.depth_mm, linear.center)), filling);
         if load != load_before {
             fastest_change_s = fastest_change_s.min(step.time_s - before_s);
         }
         (before_s, load_before) = (step.time_s, load);
-        contacts.extend(linear.as_ref().map(|linear| question.estimate(linear, false)));
+        contacts.extend(linear.as_ref().map(|linear| (index, question.estimate(linear, false))));
     }
-    let mut decision = first.decide(worst.expected, &sink).map_err(|cause| at(0, cause))?;
-    leave_fluid_out(sequence, &mut decision).map_err(|cause| at(0, cause))?;
+    let decision = first.decide(worst.expected, &sink).map_err(|cause| at(0, cause))?;
     let around = middle(&contacts);
     let fitted = |contact| around.as_ref().is_some_and(|(mesh, _)| fits(mesh, contact));
-    let is_one_contact = contacts.iter().all(fitted);
+    let is_one_contact = contacts.iter().all(|(_, contact)| fitted(contact));
     let expected = worst.expected;
+    let bleb = first.bleb().filter(|_| decision.bleb);
     drop(first);
-    Ok((patch, Plan { around, is_one_contact, unpressed, expected, is_held, decision, sink, fastest_change_s }))
-}
-
-/// A sequence has no fluid under the retina: it says so, and refuses what names it.
-///
-/// # Errors
-/// [`PredictError::Effect`] where the effect is named.
-fn leave_fluid_out(sequence: &Sequence, decision: &mut Decision) -> Result<(), PredictError> {
-    if matches!(&sequence.effects, EffectChoice::Named(names) if names.iter().any(|name| name == bleb::NAME)) {
-        let problem = "is not simulated in a sequence".to_owned();
-        return Err(PredictError::Effect { name: bleb::NAME.to_owned(), problem });
-    }
-    if decision.bleb {
-        let told = decision.reports.iter().find(|report| report.name == bleb::NAME);
-        let reason = told.map_or_else(String::new, |report| format!("{}; not simulated in a sequence", report.reason));
-        decision.without(&[bleb::NAME], &reason);
-        decision.bleb = false;
-    }
-    Ok(())
+    let plan =
+        Plan { around, is_one_contact, unpressed, expected, is_held, decision, dry, bleb, contacts, fastest_change_s };
+    Ok((patch, plan))
 }

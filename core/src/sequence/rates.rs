@@ -61,11 +61,11 @@ pub(super) fn decide(prepared: &PreparedScene, sequence: &Sequence, plan: &Plan)
     let longest_s = networks.iter().fold(0.0, |longest: f64, network| longest.max(network.relaxation_time_s));
     let period_s = slowest_period_s(tissue);
     let overshoot = period_s / (PI * change_s);
-    let touches = change_s.is_finite() && decision.contact;
+    let loads = change_s.is_finite() && (decision.contact || decision.bleb);
     let mut judge = |name: &'static str, value: f64, times: String| {
         let called_for = value > RATE_TOLERANCE;
         let (simulated, why) = match &sequence.effects {
-            _ if !touches => (false, "the needle presses in no step".to_owned()),
+            _ if !loads => (false, "the needle presses in no step".to_owned()),
             EffectChoice::Auto | EffectChoice::AutoWithin { .. } => (called_for, times),
             EffectChoice::All => (true, "asked for with `all`".to_owned()),
             EffectChoice::Named(names) => (names.iter().any(|n| n == name), "as listed in the request".to_owned()),
@@ -74,8 +74,8 @@ pub(super) fn decide(prepared: &PreparedScene, sequence: &Sequence, plan: &Plan)
             name,
             simulated,
             reason: why,
-            value: touches.then_some(value),
-            threshold: touches.then_some(RATE_TOLERANCE),
+            value: loads.then_some(value),
+            threshold: loads.then_some(RATE_TOLERANCE),
         };
         decision.tell(report);
         simulated

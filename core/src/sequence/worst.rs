@@ -6,7 +6,6 @@
 use nalgebra::UnitQuaternion;
 
 use super::Simulation;
-use crate::effects::bleb;
 use crate::predict::choice::Expected;
 use crate::predict::linear::LinearAnswer;
 use crate::predict::{EffectChoice, PredictError, Question, Sink};
@@ -72,14 +71,14 @@ impl Simulation {
         linear: Option<&LinearAnswer>,
     ) -> Result<(Worst, Vec<String>), PredictError> {
         let mut met = self.state.met;
-        met.meet(question, linear, &self.plan.sink);
+        let sink = question.with_fluid(self.plan.dry.clone());
+        met.meet(question, linear, &sink);
         if self.sequence.effects != EffectChoice::Auto {
             return Ok((met, Vec::new()));
         }
-        let called_for = question.decide(met.expected, &self.plan.sink)?;
-        // Fluid is left out of every plan, which says so.
+        let called_for = question.decide(met.expected, &sink)?;
         let planned = |name: &str| self.effects().iter().any(|report| report.name == name && report.simulated);
-        let missed = called_for.reports.iter().filter(|report| report.simulated && report.name != bleb::NAME);
+        let missed = called_for.reports.iter().filter(|report| report.simulated);
         let told = missed.filter(|report| !planned(report.name)).map(|report| {
             format!(
                 "the motion so far calls for `{}`, which the plan did not foresee: it is not simulated",

@@ -119,6 +119,7 @@ impl Conversation {
             orientation_xyzw: Some(Quaternion(orientation)),
             direction: None,
             force_mn: self.force_mn.map(|force| Vector(self.axes.turn(force))),
+            bleb: None,
         };
         Ok(Taken::Pose(pose, Tag { stamp: frame.stamp, columns: transform.columns }))
     }

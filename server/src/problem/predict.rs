@@ -67,6 +67,9 @@ pub fn from_predict(error: PredictError) -> Problem {
             format!("a middle within {limit_mm} mm of the patch's centre in x and y"),
             detail,
         ),
+        PredictError::NoBleb => {
+            Problem::field(Kind::NotPossible, "bleb", None, "left out, or a scene with `bleb`", detail)
+        }
         PredictError::BesideBleb { away_mm, most_mm, core_mm, .. } => Problem::field(
             Kind::NotPossible,
             "needle.tip_mm",

@@ -35,9 +35,16 @@ pub fn from_sequence(error: SequenceError) -> Problem {
     }
 }
 
+/// The place in a step of how much fluid there is, which a scene has too; what the scene has was checked before any step.
+pub(super) fn own_filling(field: &str) -> Option<&str> {
+    let own = field.strip_prefix("scene.")?;
+    ["bleb.volume_mm3", "bleb.pressure_kpa"].contains(&own).then_some(own)
+}
+
 /// The place in a sequence of a field that a single request has.
 fn at_step(field: &str, step: usize) -> String {
-    let number = field.strip_prefix("needle.").unwrap_or(field);
-    let of_step = ["tip_mm", "direction", "orientation_xyzw", "force_mn"].iter().any(|own| number.starts_with(own));
+    let number = field.strip_prefix("needle.").unwrap_or(own_filling(field).unwrap_or(field));
+    let of_step =
+        ["tip_mm", "direction", "orientation_xyzw", "force_mn", "bleb"].iter().any(|own| number.starts_with(own));
     if of_step { format!("steps[{step}].{number}") } else { field.to_owned() }
 }

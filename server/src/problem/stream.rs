@@ -3,6 +3,7 @@
 use retina_core::sequence::{SequenceError, StepError};
 use serde_json::json;
 
+use super::sequence::own_filling;
 use super::{Kind, Problem, from_predict, from_sequence};
 use crate::understand::REHEARSAL;
 
@@ -10,9 +11,11 @@ use crate::understand::REHEARSAL;
 /// `open`.
 pub fn of_pose(mut problem: Problem) -> Problem {
     for error in &mut problem.errors {
-        let number = error.field.strip_prefix("needle.").unwrap_or(&error.field);
-        let of_pose =
-            ["tip_mm", "direction", "orientation_xyzw", "force_mn", "time_s"].iter().any(|own| number.starts_with(own));
+        let field = own_filling(&error.field).unwrap_or(&error.field);
+        let number = field.strip_prefix("needle.").unwrap_or(field);
+        let of_pose = ["tip_mm", "direction", "orientation_xyzw", "force_mn", "time_s", "bleb"]
+            .iter()
+            .any(|own| number.starts_with(own));
         error.field = if of_pose { format!("pose.{number}") } else { format!("open.{}", error.field) };
     }
     problem

@@ -142,6 +142,7 @@ pub fn pose(bytes: &[u8]) -> Result<StreamPose, Problem> {
         orientation_xyzw: given.then(|| Quaternion([x, y, z, number(48)])),
         direction: None,
         force_mn: (flags & FORCE_GIVEN != 0).then(|| Vector(vector(52))),
+        bleb: None,
     };
     let finite = |name: &str, numbers: &[f64]| match numbers.iter().find(|number| !number.is_finite()) {
         Some(number) => Err(refused(name, number.to_string(), "finite numbers")),

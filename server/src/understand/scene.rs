@@ -18,8 +18,8 @@ use crate::problem::{Kind, Problem, from_out_of_range};
 use crate::wire::fixed::{Triangle, Vector};
 use crate::wire::request::SceneChoice;
 use crate::wire::scene::{
-    BlebSpec, BondSpec, LayerSpec, PoseSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec, SurfaceKind,
-    SurfaceSpec, TissueSpec,
+    BlebSpec, BondSpec, FillingSpec, LayerSpec, PoseSpec, PronyTermSpec, PunctureSpec, RateSpec, RetinaSpec, SceneSpec,
+    SurfaceKind, SurfaceSpec, TissueSpec,
 };
 
 /// Name of every scene that is written out.
@@ -219,22 +219,26 @@ fn bond(spec: &BondSpec) -> RetinalBond {
 
 fn bleb(spec: &BlebSpec, scene_from_patch: &Isometry3<f64>) -> Result<SubretinalFluid, Problem> {
     let center = spec.center_mm.map(|center| Point3::from(center.0));
-    let filling = match (spec.volume_mm3, spec.pressure_kpa) {
-        (Some(_), Some(_)) => return Err(both("scene.bleb.pressure_kpa", "scene.bleb.volume_mm3")),
-        (Some(volume_mm3), None) => Filling::Volume(volume_mm3),
-        (None, Some(pressure_kpa)) => Filling::Pressure(pressure_kpa),
-        (None, None) => {
-            let field = "scene.bleb.volume_mm3";
-            let allowed = format!("{} to {} mm³, or scene.bleb.pressure_kpa", bleb::VOLUME.min, bleb::VOLUME.max);
-            let detail = format!("{field} or scene.bleb.pressure_kpa must be given");
-            return Err(Problem::field(Kind::InvalidRequest, field, None, allowed, detail));
-        }
-    };
     Ok(SubretinalFluid {
-        filling,
+        filling: filling("scene.bleb", &FillingSpec { volume_mm3: spec.volume_mm3, pressure_kpa: spec.pressure_kpa })?,
         center_mm: center.unwrap_or_else(|| scene_from_patch * Point3::origin()),
         radius_mm: spec.radius_mm.unwrap_or(bleb::RADIUS.default),
     })
+}
+
+/// The filling at `path`.
+pub(super) fn filling(path: &str, spec: &FillingSpec) -> Result<Filling, Problem> {
+    let [volume, pressure] = ["volume_mm3", "pressure_kpa"].map(|number| format!("{path}.{number}"));
+    match (spec.volume_mm3, spec.pressure_kpa) {
+        (Some(_), Some(_)) => Err(both(&pressure, &volume)),
+        (Some(volume_mm3), None) => Ok(Filling::Volume(volume_mm3)),
+        (None, Some(pressure_kpa)) => Ok(Filling::Pressure(pressure_kpa)),
+        (None, None) => {
+            let allowed = format!("{} to {} mm³, or {pressure}", bleb::VOLUME.min, bleb::VOLUME.max);
+            let detail = format!("{volume} or {pressure} must be given");
+            Err(Problem::field(Kind::InvalidRequest, volume, None, allowed, detail))
+        }
+    }
 }
 
 fn puncture(spec: &PunctureSpec) -> Result<Puncture, Problem> {

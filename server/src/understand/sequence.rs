@@ -6,6 +6,7 @@ use retina_core::predict::budget::{Budget, DEFAULT_LEVEL};
 use retina_core::sequence::{Sequence, Step};
 use serde_json::json;
 
+use super::scene::filling;
 use super::{budget, effects, force, needle};
 use crate::problem::{Kind, Problem};
 use crate::wire::SimulateRequest;
@@ -47,6 +48,7 @@ fn step(path: String, spec: &StepSpec) -> Result<Step, Problem> {
         tip_mm: spec.tip_mm.map(|tip_mm| Point3::from(tip_mm.0)),
         orientation: needle::orientation(&path, spec.orientation_xyzw.as_ref(), spec.direction.as_ref())?,
         force_mn,
+        fluid: spec.bleb.as_ref().map(|spec| filling(&format!("{path}.bleb"), spec)).transpose()?,
     })
 }
 

@@ -8,6 +8,7 @@ use retina_core::predict::{Control, EffectChoice, Request};
 use retina_core::sequence::{Sequence, Step};
 use serde_json::json;
 
+use super::scene::filling;
 use super::sequence::{level, steps};
 use super::{Shared, force, needle, shared};
 use crate::problem::{Kind, Problem};
@@ -89,6 +90,7 @@ pub fn step(pose: &StreamPose, time_s: f64) -> Result<Step, Problem> {
         tip_mm: pose.tip_mm.map(|Vector(tip_mm)| Point3::from(tip_mm)),
         orientation: needle::orientation("needle", pose.orientation_xyzw.as_ref(), pose.direction.as_ref())?,
         force_mn: pose.force_mn.map(|force_mn| force("force_mn", force_mn)).transpose()?,
+        fluid: pose.bleb.as_ref().map(|spec| filling("bleb", spec)).transpose()?,
     })
 }
 
@@ -103,6 +105,9 @@ pub fn pose(opening: &Opening, pose: &StreamPose) -> Result<Request, Problem> {
     };
     if pose.time_s.is_some() {
         return Err(only_remembered("time_s", pose.time_s, "left out"));
+    }
+    if pose.bleb.is_some() {
+        return Err(only_remembered("bleb", None, "left out"));
     }
     let needle = needle::placed(
         opening.shape,

@@ -34,7 +34,7 @@ pub struct SceneSpec {
     /// Where the tissue punctures; the limits of the tissue model when left out.
     #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub puncture: Option<PunctureSpec>,
-    /// Fluid between retina and choroid; none when left out. Levels `coarse` and `reference`, and no sequence, have it.
+    /// Fluid between retina and choroid; none when left out. Levels `coarse` and `reference` have it.
     #[serde(default, deserialize_with = "object::optional", skip_serializing_if = "Option::is_none")]
     pub bleb: Option<BlebSpec>,
 }
@@ -55,6 +55,16 @@ pub struct BlebSpec {
     /// Radius of the detached disc, mm, 0.2 to 1; 0.5 when left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_mm: Option<f64>,
+}
+
+/// How much fluid there is on the scene's detached disc: one of the two.
+#[derive(Clone, Copy, Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FillingSpec {
+    /// Volume, mm³ (the same number in µl), 0 to 0.5; the pressure is then part of the answer. At 0 the detached retina lies on what is below.
+    pub volume_mm3: Option<f64>,
+    /// Pressure above that in the eye, kPa, 0 to 8; the volume is then part of the answer.
+    pub pressure_kpa: Option<f64>,
 }
 
 /// Where the tissue punctures: an answer beyond a limit says so, by its contact's state. A number left out is the default.

@@ -15,6 +15,7 @@ use super::fixed::{Quaternion, Triangle, Vector};
 use super::object;
 use super::request::{AccuracySpec, EffectsSpec, NeedleSpec, SceneChoice};
 use super::response::{ContactAnswer, EffectAnswer, NeedleAnswer, SolverAnswer, TimeAnswer, points, vectors};
+use super::scene::FillingSpec;
 use crate::problem::ProblemDocument;
 
 /// A needle, a timed list of what is done with it, and what it is pressed into.
@@ -61,6 +62,10 @@ pub struct StepSpec {
     /// Force along which the needle advances until the tissue's reaction along it equals it, scene frame, mN; zero withdraws the needle. Left out: the
     /// needle stays where it is, and the reaction is the answer.
     pub force_mn: Option<Vector>,
+    /// Fluid that is on the detached disc of `scene.bleb` at the step's time, injected or drawn off since the step before; as much as then when left out. The disc stays as wide as
+    /// it is.
+    #[serde(default, deserialize_with = "object::optional")]
+    pub bleb: Option<FillingSpec>,
 }
 
 /// One line of the answer.

@@ -11,6 +11,7 @@ use super::object;
 use super::pose::PoseAnswer;
 use super::request::{AccuracySpec, EffectsSpec, SceneChoice, TipSpec};
 use super::response::EffectAnswer;
+use super::scene::FillingSpec;
 use super::sequence::StepSpec;
 use crate::problem::ProblemDocument;
 
@@ -102,6 +103,10 @@ pub struct StreamPose {
     /// Force along which the needle advances until the tissue's reaction along it equals it, scene frame, mN. Left out: the needle stays
     /// where it is, and the reaction is the answer.
     pub force_mn: Option<Vector>,
+    /// In a session with memory: fluid that is on the detached disc of the scene's `bleb` now; as much as at the last pose when left out. Not in a session without memory, nor in a
+    /// binary pose.
+    #[serde(default, deserialize_with = "object::optional")]
+    pub bleb: Option<FillingSpec>,
 }
 
 /// A message of the server.

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::{binary, text, with_client};
 use crate::harness::{Running, runtime, with};
 use crate::schema::assert_matches;
-use crate::sequences::{lines, simulate};
+use crate::sequences::{injection, lines, simulate};
 
 /// A needle dragged over rough tissue until it slips, back, pushed by a force, let be, lifted.
 fn drag() -> Vec<Value> {
@@ -184,6 +184,33 @@ fn what_makes_no_sense_is_a_problem_and_changes_nothing() {
             let answer = ask(&mut client, &pose(sequence, step)).await["answer"].take();
             assert_is_step(&answer, listed);
         }
+    });
+}
+
+#[test]
+fn fluid_comes_and_goes_in_a_stream_as_in_a_simulation() {
+    with_client(&["--threads", "2"], async |service, mut client| {
+        let request = injection();
+        let (status, _, body) = tokio::task::block_in_place(|| simulate(service, &request));
+        assert_eq!(status, 200, "{body}");
+        let listed: Vec<Value> =
+            lines(&body).into_iter().filter_map(|mut line| line.get_mut("step").map(Value::take)).collect();
+        let steps = request["steps"].as_array().expect("list");
+        let mut rehearsal = steps.clone();
+        rehearsal[0]["tip_mm"] = request["needle"]["tip_mm"].clone();
+        let session = json!({"scene": request["scene"], "memory": {"rehearsal": rehearsal}});
+        client.open(session.clone()).await.expect("session");
+        for (sequence, (step, listed)) in (1..).zip(rehearsal.iter().zip(&listed)) {
+            let answer = ask(&mut client, &pose(sequence, step)).await["answer"].take();
+            assert_is_step(&answer, listed);
+        }
+        let more = json!({"pose": {"sequence": 9, "time_s": 9.0, "bleb": {"volume_mm3": 0.6}}});
+        let reply = ask(&mut client, &more).await["problem"]["problem"].take();
+        assert_eq!(reply["errors"][0]["field"], "pose.bleb.volume_mm3", "{reply}");
+        client.open(json!({"accuracy": {"level": "linear"}})).await.expect("one without memory");
+        let wet = json!({"pose": {"sequence": 1, "tip_mm": [0.0, 0.0, 0.0], "bleb": {"volume_mm3": 0.02}}});
+        let reply = ask(&mut client, &wet).await["problem"]["problem"].take();
+        assert_eq!(reply["errors"][0]["field"], "pose.bleb", "{reply}");
     });
 }
 

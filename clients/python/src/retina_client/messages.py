@@ -371,6 +371,16 @@ class FieldError(_FieldErrorRequired, total=False):
     """The value that was refused, as far as it is a number, a word or something short."""
 
 
+class FillingSpec(TypedDict, total=False):
+    """How much fluid there is on the scene's detached disc: one of the two."""
+    pressure_kpa: Optional[float]
+    """Pressure above that in the eye, kPa, 0 to 8; the volume is then part of the answer."""
+    volume_mm3: Optional[float]
+    """Volume, mm³ (the same number in µl), 0 to 0.5; the pressure is then part of the answer. At 0 the detached
+    retina lies on what is below.
+    """
+
+
 class FlatTip(TypedDict, total=False):
     """A plane across the shaft with a rounded edge."""
     edge_radius_mm: Optional[float]
@@ -854,6 +864,7 @@ class _StepSpecRequired(TypedDict):
 
 class StepSpec(_StepSpecRequired, total=False):
     """One step. What is left out of the needle's pose is where the step before left it."""
+    bleb: Optional["FillingSpec"]
     direction: Optional["Vector"]
     force_mn: Optional["Vector"]
     orientation_xyzw: Optional["Quaternion"]
@@ -950,6 +961,7 @@ class _StreamPoseRequired(TypedDict):
 
 class StreamPose(_StreamPoseRequired, total=False):
     """Where the needle is, and how it pushes."""
+    bleb: Optional["FillingSpec"]
     client_time_us: Optional[float]
     """The client's clock, µs, or any other number that the answer is to repeat."""
     direction: Optional["Vector"]
