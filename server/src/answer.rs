@@ -3,7 +3,7 @@
 //! The same function answers over HTTP and on the command line.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use retina_core::predict::budget::{Budget, DEFAULT_LEVEL};
 use retina_core::predict::{Prediction, PreparedScene, Request, Workspace};
@@ -28,6 +28,19 @@ pub struct Answer {
     pub request: Request,
     /// What the core said.
     pub prediction: Prediction,
+    /// See [`Computed::accounted`].
+    pub accounted: Option<Duration>,
+}
+
+/// A prediction with the level that was chosen.
+pub struct Computed {
+    /// The request.
+    pub request: Request,
+    /// What the core said.
+    pub prediction: Prediction,
+    /// Where a time or an error was asked for: what passed before the level was chosen, and what the prediction took. What the answer takes besides is
+    /// [`Times::around_ms`].
+    pub accounted: Option<Duration>,
 }
 
 /// The answer to the request in `body`.
@@ -69,10 +82,10 @@ pub fn predict(
     stopwatch: &mut Stopwatch,
     layout: Layout,
 ) -> Result<Answer, Problem> {
-    let (request, prediction) = compute(scene, question, workspace, stopwatch)?;
+    let Computed { request, prediction, accounted } = compute(scene, question, workspace, stopwatch)?;
     let response = PredictResponse::new(&prediction, stopwatch.finish());
     let bytes = write(&response, layout).map_err(Problem::internal)?;
-    Ok(Answer { bytes, scene: Arc::clone(scene), request, prediction })
+    Ok(Answer { bytes, scene: Arc::clone(scene), request, prediction, accounted })
 }
 
 /// As [`predict`], without writing it down: the request with the level chosen, and what the core says.
@@ -84,16 +97,18 @@ pub fn compute(
     question: Question,
     workspace: &mut Workspace,
     stopwatch: &mut Stopwatch,
-) -> Result<(Request, Prediction), Problem> {
+) -> Result<Computed, Problem> {
     let Question { mut request, mut budget, times } = question;
     let mut broken = Vec::new();
+    let mut waited = None;
     request.level = match budget.level {
         Some(level) if !budget.promises() => level,
         None if !budget.promises() => DEFAULT_LEVEL,
         _ => {
             stopwatch.stage("choose");
-            let spent_ms = stopwatch.elapsed().as_secs_f64() * 1e3;
-            budget.max_time_ms = budget.max_time_ms.map(|most| (most - spent_ms).max(0.0));
+            let spent = *waited.insert(stopwatch.elapsed());
+            let besides_ms = spent.as_secs_f64() * 1e3 + times.around_ms();
+            budget.max_time_ms = budget.max_time_ms.map(|most| (most - besides_ms).max(0.0));
             let choice = scene.choose(&request, &budget, &times.expected_ms()).map_err(from_predict)?;
             broken = choice.broken;
             choice.level
@@ -101,7 +116,8 @@ pub fn compute(
     };
     let start = Instant::now();
     let mut prediction = scene.predict(&request, workspace, stopwatch).map_err(from_predict)?;
-    times.record(request.level, start.elapsed());
+    let predicted = start.elapsed();
+    times.record(request.level, predicted);
     prediction.warnings.append(&mut broken);
-    Ok((request, prediction))
+    Ok(Computed { request, prediction, accounted: waited.map(|waited| waited + predicted) })
 }

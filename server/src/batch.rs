@@ -14,7 +14,7 @@ use retina_core::predict::{PreparedScene, Request, Workspace};
 use retina_core::progress::Progress as _;
 use serde_json::json;
 
-use crate::answer::{Question, compute};
+use crate::answer::{Computed, Question, compute};
 use crate::metrics::Metrics;
 use crate::pool::{Pool, PoolError, Ticket};
 use crate::problem::{Kind, Problem};
@@ -147,7 +147,7 @@ impl Batch {
         stopwatch.stage("prepare");
         let answered = self.requests[index].clone().and_then(|request| {
             let question = Question { request, budget: self.shared.budget, times };
-            let (request, prediction) =
+            let Computed { request, prediction, .. } =
                 compute(&self.scene, question, workspace, stopwatch).map_err(|problem| at(index, problem))?;
             metrics.predicted(&self.scene, &request, &prediction, stopwatch.finish());
             write(&BatchAnswer::Prediction(Box::new((&prediction).into())), Layout::Compact).map_err(Problem::internal)

@@ -8,7 +8,7 @@ use axum::extract::rejection::PathRejection;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::{Path, State};
-use axum::http::{HeaderMap, Method, Uri, header};
+use axum::http::{HeaderMap, HeaderName, Method, Uri, header};
 use axum::response::{IntoResponse, Response};
 
 use prometheus_client::metrics::counter::Counter;
@@ -23,6 +23,9 @@ use crate::wire::{
     About, BatchRequest, BatchResponse, CostTable, GaugeList, LevelList, PredictRequest, PredictResponse, Readiness,
     SimulateLine, SimulateRequest,
 };
+
+/// How long an answer took (W3C *Server Timing*).
+const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 
 /// What the surface looks like when a needle at this pose pushes with this force.
 #[utoipa::path(
@@ -42,8 +45,9 @@ use crate::wire::{
     )
 )]
 pub async fn predict(State(app): State<AppState>, headers: HeaderMap, body: Body) -> Result<Response, Problem> {
-    let answer = app.answer(&headers, body).await?;
-    Ok(([(header::CONTENT_TYPE, "application/json")], answer).into_response())
+    let (answer, took) = app.answer(&headers, body).await?;
+    let timing = format!("total;dur={:.3}", took.as_secs_f64() * 1e3);
+    Ok(([(header::CONTENT_TYPE, "application/json".to_owned()), (SERVER_TIMING, timing)], answer).into_response())
 }
 
 /// What the surface looks like for each of many poses.

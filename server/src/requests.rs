@@ -27,11 +27,11 @@ use crate::wire::StoredScene;
 const SIMULATION_COST: Duration = Duration::from_secs(1);
 
 impl App {
-    /// Answers the request whose body is on its way.
+    /// Answers the request whose body is on its way; how long that took from its arrival on.
     ///
     /// # Errors
     /// The problem that the caller is told of.
-    pub async fn answer(&self, headers: &HeaderMap, body: Body) -> Result<Vec<u8>, Problem> {
+    pub async fn answer(&self, headers: &HeaderMap, body: Body) -> Result<(Vec<u8>, Duration), Problem> {
         let body = self.bodies.json(headers, body).await?;
         let accepted = Instant::now();
         let ticket = admission::ticket(body.as_ref(), &self.times, self.longest_wait);
@@ -43,15 +43,22 @@ impl App {
             if let Ok(answer) = &answer {
                 metrics.predicted(&answer.scene, &answer.request, &answer.prediction, stopwatch.stages());
             }
-            match recorder {
+            let accounted = answer.as_ref().ok().and_then(|answer| answer.accounted);
+            let bytes = match recorder {
                 Some(recorder) => recorder.record(body.as_ref(), accepted, answer),
                 None => answer.map(|answer| answer.bytes),
-            }
+            };
+            bytes.map(|bytes| (bytes, accounted))
         };
-        self.pool.run(ticket, job).await.unwrap_or_else(|error| match &self.recorder {
-            Some(recorder) => recorder.record(b"", accepted, Err(error.into())),
+        let (bytes, accounted) = self.pool.run(ticket, job).await.unwrap_or_else(|error| match &self.recorder {
+            Some(recorder) => recorder.record(b"", accepted, Err(error.into())).map(|bytes| (bytes, None)),
             None => Err(error.into()),
-        })
+        })?;
+        let took = accepted.elapsed();
+        if let Some(accounted) = accounted {
+            self.times.record_around(took.saturating_sub(accounted));
+        }
+        Ok((bytes, took))
     }
 
     /// Answers the poses whose list is on its way, in pieces as they are done. The work ends when the answer is dropped.

@@ -16,7 +16,7 @@ use super::refusal::Refusal;
 use super::request::{Asked, read};
 use super::respond::{Columns, Written, write};
 use crate::admission::of_budget;
-use crate::answer::{Question, compute};
+use crate::answer::{Computed, Question, compute};
 use crate::batch::piece_size;
 use crate::body::Received;
 use crate::pool::Ticket;
@@ -100,7 +100,7 @@ fn piece(
             let scene = app.scenes.get(Some(choice))?;
             let budget = Budget { level: Some(request.level), ..Budget::default() };
             let question = Question { request: request.clone(), budget, times: &app.times };
-            let (request, prediction) = compute(&scene, question, workspace, &mut stopwatch)?;
+            let Computed { request, prediction, .. } = compute(&scene, question, workspace, &mut stopwatch)?;
             Ok::<_, Problem>((scene, request, prediction))
         };
         let (scene, request, prediction) = answer().map_err(|problem| Refusal::from(problem).of_row(row))?;

@@ -63,10 +63,10 @@ impl Memory {
             )
         })?;
         let motion = Simulation::new(scene, rehearsal, stopwatch).map_err(of_rehearsal)?;
-        if !motion.presses() {
-            let allowed = "a step that presses the tissue";
+        if !motion.loads() {
+            let allowed = "a step that presses the tissue, or a scene with fluid under it";
             let detail =
-                format!("the needle presses in no step of {REHEARSAL}, so nothing is known of what pressing calls for");
+                format!("no step of {REHEARSAL} loads the tissue, so nothing is known of what a load calls for");
             return Err(Problem::field(Kind::InvalidRequest, REHEARSAL, None, allowed, detail));
         }
         Ok(Self {

@@ -10,7 +10,7 @@ use super::binary::Head;
 use super::memory::{Memories, Memory};
 use super::protocol::{Form, Opening};
 use crate::admission;
-use crate::answer::{Question, compute};
+use crate::answer::{Computed, Question, compute};
 use crate::metrics::Metrics;
 use crate::pool::Ticket;
 use crate::problem::{Problem, of_pose};
@@ -116,7 +116,8 @@ impl<F: Form> Session<F> {
         let request = understand::pose(&self.opening, pose).map_err(of_pose)?;
         stopwatch.stage("prepare");
         let question = Question { request, budget: self.opening.shared.budget, times };
-        let (request, prediction) = compute(&self.scene, question, workspace, stopwatch).map_err(of_pose)?;
+        let Computed { request, prediction, .. } =
+            compute(&self.scene, question, workspace, stopwatch).map_err(of_pose)?;
         metrics.predicted(&self.scene, &request, &prediction, stopwatch.finish());
         Ok(prediction)
     }

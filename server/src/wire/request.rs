@@ -134,8 +134,8 @@ pub struct AccuracySpec {
     /// answers.
     #[schema(example = 5.0)]
     pub max_error_um: Option<f64>,
-    /// Longest time from the arrival of the request to its answer that is accepted, ms: with `max_error_um` it bounds the choice,
-    /// alone it asks for the most accurate level in time.
+    /// Longest time from the arrival of the request to its answer that is accepted, ms, by the service's clock (header `Server-Timing` of the answer): with `max_error_um` it
+    /// bounds the choice, alone it asks for the most accurate level in time.
     #[schema(example = 20.0)]
     pub max_time_ms: Option<f64>,
     /// Whether a promise that no level is expected to keep is refused; otherwise the best there is answers, with a warning.

@@ -2,7 +2,7 @@
 //!
 //! Random requests of the working range over the built-in scenes ask a service in this process for an error, a time or both. First the truth of each is computed, that of
 //! the data sets (`retina_models::dataset::truth`): half an hour, whatever else the machine does. It is kept in `target/promises-SEED.jsonl` as it comes, so an
-//! interrupted run goes on where it stopped. Then all are asked, one at a time, in less than a minute: deadlines are promised for an idle machine, and what else it was
+//! interrupted run goes on where it stopped. Then all are asked, one at a time, in some ten minutes: deadlines are promised for an idle machine, and what else it was
 //! busy with meanwhile is told.
 
 use std::collections::HashMap;

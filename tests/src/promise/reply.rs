@@ -30,30 +30,47 @@ pub struct Audited {
     pub p95_um: f64,
     /// The error of the worst node (µm).
     pub error_um: f64,
-    /// From sending to the whole answer, as the client sees it (ms).
+    /// From the arrival of the request to its answer, by the service's clock (ms).
     pub ms: f64,
+    /// From sending to the whole answer, as the client sees it (ms).
+    pub client_ms: f64,
 }
 
-/// Posts `body` and returns the answer with the time that it took (ms).
+/// An answer, and how long it took by the service's clock and by the client's (ms).
+#[derive(Clone, Debug)]
+pub struct Reply {
+    /// The body.
+    pub answer: Value,
+    /// By the service's clock.
+    pub ms: f64,
+    /// By the client's.
+    pub client_ms: f64,
+}
+
+/// Posts `body` and returns the answer with the times that it took.
 ///
 /// # Errors
 /// What the service or the connection said, in words.
-pub fn post(agent: &ureq::Agent, address: SocketAddr, body: &Value) -> Result<(Value, f64), String> {
+pub fn post(agent: &ureq::Agent, address: SocketAddr, body: &Value) -> Result<Reply, String> {
     let text = body.to_string();
     let started = Instant::now();
     let post = agent.post(format!("http://{address}/v1/predict")).header("content-type", "application/json");
     let mut response = post.send(&text).map_err(|error| error.to_string())?;
     let status = response.status().as_u16();
+    let timing = response.headers().get("server-timing").and_then(|timing| timing.to_str().ok());
+    let service_ms = timing.and_then(|timing| timing.rsplit("dur=").next()?.parse().ok());
     let answer = response.body_mut().read_to_string().map_err(|error| error.to_string())?;
-    let ms = started.elapsed().as_secs_f64() * 1e3;
+    let client_ms = started.elapsed().as_secs_f64() * 1e3;
     if status != 200 {
         return Err(format!("{status}: {answer}"));
     }
-    Ok((serde_json::from_str(&answer).map_err(|error| error.to_string())?, ms))
+    let answer = serde_json::from_str(&answer).map_err(|error| error.to_string())?;
+    Ok(Reply { answer, ms: service_ms.ok_or("an answer without Server-Timing")?, client_ms })
 }
 
 /// Holds an answer against the true vertices (mm); `None` for an answer that lacks what every answer has.
-pub fn audited(index: usize, asked: Asked, (answer, ms): &(Value, f64), truth: &[Point3<f64>]) -> Option<Audited> {
+pub fn audited(index: usize, asked: Asked, reply: &Reply, truth: &[Point3<f64>]) -> Option<Audited> {
+    let Reply { answer, ms, client_ms } = reply;
     let accuracy = &answer["accuracy"];
     let vertices: Vec<[f64; 3]> = serde_json::from_value(answer["surface"]["vertices_mm"].clone()).ok()?;
     let vertices: Vec<Point3<f64>> = vertices.into_iter().map(Point3::from).collect();
@@ -68,5 +85,6 @@ pub fn audited(index: usize, asked: Asked, (answer, ms): &(Value, f64), truth: &
         p95_um: accuracy["expected_error_um"]["p95"].as_f64().unwrap_or(f64::INFINITY),
         error_um: node_errors_um(&vertices, truth).into_iter().fold(0.0, f64::max),
         ms: *ms,
+        client_ms: *client_ms,
     })
 }

@@ -16,7 +16,7 @@ pub fn percent(part: usize, whole: usize) -> f64 {
 pub fn table(all: &[Audited]) -> String {
     let mut text = String::from(
         "| level | answers | called calibrated | of these beyond their 95 % bound, % | bound µm: median | error µm: median | p95 | largest | \
-         error asked for and not warned: exceeded, % | deadline asked for and not warned: kept, % |\n|---|---|---|---|---|---|---|---|---|---|\n",
+         error asked for and not warned: exceeded, % | deadline asked for and not warned: kept, % | by the client's clock, % |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     let levels = Level::ALL.map(|level| (level.name(), Some(level.name())));
     for (name, level) in levels.into_iter().chain([("all", None)]) {
@@ -34,16 +34,17 @@ pub fn table(all: &[Audited]) -> String {
             .filter_map(|audited| Some((audited.error_um, audited.asked.max_error_um?)))
             .collect();
         let exceeded = promised.iter().filter(|(error, asked)| error > asked).count();
-        let timed: Vec<(f64, f64)> = of
+        let timed: Vec<(f64, f64, f64)> = of
             .iter()
             .filter(|audited| !audited.warned)
-            .filter_map(|audited| Some((audited.ms, audited.asked.max_time_ms?)))
+            .filter_map(|audited| Some((audited.ms, audited.client_ms, audited.asked.max_time_ms?)))
             .collect();
-        let kept = timed.iter().filter(|(ms, asked)| ms <= asked).count();
+        let kept = timed.iter().filter(|(ms, _, asked)| ms <= asked).count();
+        let kept_there = timed.iter().filter(|(_, client_ms, asked)| client_ms <= asked).count();
         // A String takes whatever is written.
         let _ = writeln!(
             text,
-            "| `{name}` | {} | {} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} of {} | {:.1} of {} |",
+            "| `{name}` | {} | {} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} of {} | {:.1} of {} | {:.1} |",
             of.len(),
             calibrated.len(),
             percent(beyond, calibrated.len()),
@@ -55,6 +56,7 @@ pub fn table(all: &[Audited]) -> String {
             promised.len(),
             percent(kept, timed.len()),
             timed.len(),
+            percent(kept_there, timed.len()),
         );
     }
     text

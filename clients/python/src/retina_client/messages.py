@@ -78,8 +78,9 @@ class AccuracySpec(TypedDict, total=False):
     level that keeps it answers.
     """
     max_time_ms: Optional[float]
-    """Longest time from the arrival of the request to its answer that is accepted, ms: with `max_error_um` it bounds
-    the choice, alone it asks for the most accurate level in time.
+    """Longest time from the arrival of the request to its answer that is accepted, ms, by the service's clock
+    (header `Server-Timing` of the answer): with `max_error_um` it bounds the choice, alone it asks for the most
+    accurate level in time.
     """
     strict: bool
     """Whether a promise that no level is expected to keep is refused; otherwise the best there is answers, with a
