@@ -307,9 +307,9 @@ impl Simulation {
         &self.decision.reports
     }
 
-    /// Whether the needle presses in some step of the plan. Where it does not, nothing is known of what pressing would call for.
-    pub fn presses(&self) -> bool {
-        self.plan.around.is_some()
+    /// Whether some step of the plan loads the tissue: the needle presses it, or fluid lifts it. Where none does, nothing is known of what a load would call for.
+    pub fn loads(&self) -> bool {
+        self.plan.around.is_some() || self.plan.bleb.is_some()
     }
 
     /// Whether a step depends on those before it: its mesh then lasts.

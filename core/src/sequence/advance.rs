@@ -161,14 +161,7 @@ impl Simulation {
         progress: &mut dyn Progress,
     ) -> Result<(Prediction, bool), PredictError> {
         let change_kpa = self.plan.dry.change_kpa;
-        let mut problem = question.problem(&self.decision, change_kpa);
-        // The pressure that keeps a volume is sought from that of the step before.
-        if let Some((bleb, before_kpa)) =
-            problem.bleb.as_mut().filter(|bleb| bleb.keeps_volume).zip(self.state.fluid_kpa)
-        {
-            bleb.pressure_kpa = before_kpa;
-        }
-        let problem = problem;
+        let problem = question.problem(&self.decision, change_kpa);
         let aim = self.aim(question, linear, &problem, unmoved, progress)?;
         progress.stage("mesh");
         let topology = self.topology.clone();
@@ -187,7 +180,7 @@ impl Simulation {
         // Where nothing is remembered, the retina is held as in a single prediction.
         let held = if self.state.history.is_none() { Held::new(&problem, &wall) } else { None };
         let adhesion = held.as_ref().map(Held::adhesion);
-        let fluid = poured(&problem, &detached);
+        let fluid = poured(&problem, &detached, self.state.fluid_kpa);
         pressing.extend(adhesion.iter().map(|effect| Addition { effect, place: Place::Interface }));
         pressing.extend(fluid.iter().map(|effect| Addition { effect, place: Place::Interface }));
         let withdrawn = question.motion.force_mn == Some(0.0) || !self.decision.contact;
@@ -253,7 +246,7 @@ impl Simulation {
         let tissue = &self.prepared.scene().tissue;
         let rest = &wall.geometry.rest;
         let mut history = History::at_rest(self.rates, &self.decision, tissue, wall.topology(), rest, detached);
-        let fluid = poured(problem, detached);
+        let fluid = poured(problem, detached, None);
         if fluid.is_some() || (self.rates.any() && !pressing.is_empty()) {
             progress.stage("equilibrium");
             let motion = Motion { direction: Vector3::z_axis(), force_mn: None, travel_mm: WITHDRAWN_MM };

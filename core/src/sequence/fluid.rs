@@ -57,8 +57,9 @@ pub(super) fn fullest(prepared: &PreparedScene, steps: &[Step]) -> Option<Fillin
     all.max_by(|a, b| prepared.volume_mm3(*a).total_cmp(&prepared.volume_mm3(*b)))
 }
 
-/// The fluid of `problem`, on these faces of the interface; `None` where there is none of it.
-pub(super) fn poured<'a>(problem: &Problem, detached: &'a [bool]) -> Option<Fluid<'a>> {
+/// The fluid of `problem`, on these faces of the interface, after a step that left it at the pressure `before_kpa` above that in the eye; `None` where there is none of it.
+pub(super) fn poured<'a>(problem: &Problem, detached: &'a [bool], before_kpa: Option<f64>) -> Option<Fluid<'a>> {
     let bleb = problem.bleb.filter(|bleb| !bleb.is_empty())?;
-    Some(Fluid { detached, holds: bleb.holds(problem.pressure_kpa.unwrap_or_default()) })
+    let start_kpa = before_kpa.unwrap_or(bleb.pressure_kpa);
+    Some(Fluid { detached, holds: bleb.holds_from(start_kpa, problem.pressure_kpa.unwrap_or_default()) })
 }
