@@ -7,6 +7,8 @@ use nalgebra::{Point3, Vector3};
 use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::{Control, EffectChoice, Level, PreparedScene, Request, Workspace};
 use retina_core::progress::Silent;
+use retina_core::scene::Scene;
+use retina_core::scene::bleb::{Filling, SubretinalFluid};
 use retina_core::sequence::{Sequence, Simulation, Step};
 use retina_tests::laws::broken;
 
@@ -47,14 +49,19 @@ fn steps(step_s: f64) -> Vec<Step> {
 
 /// Runs the steps; every answer sound. Its largest displacement (µm) and iterations, step by step.
 fn run(name: &str, steps: &[Step]) -> Vec<(f64, usize)> {
-    let scene = Arc::new(PreparedScene::new(built_in("macula")).unwrap());
-    let names = ["finite_strain", "contact", "viscoelasticity", "inertia"].map(str::to_owned).to_vec();
-    let effects = EffectChoice::Named(names);
+    run_in(built_in("macula"), &["finite_strain", "contact", "viscoelasticity", "inertia"], name, steps)
+}
+
+/// The same in this scene with these effects.
+fn run_in(scene: Scene, effects: &[&str], name: &str, steps: &[Step]) -> Vec<(f64, usize)> {
+    let scene = Arc::new(PreparedScene::new(scene).unwrap());
+    let effects = EffectChoice::Named(effects.iter().map(|name| (*name).to_owned()).collect());
     let sequence = Sequence { needle: needle(), steps: steps.to_vec(), level: Level::Coarse, effects };
     let mut simulation =
         Simulation::new(&scene, &sequence, &mut Silent).unwrap_or_else(|error| panic!("{name}: {error}"));
     let mut found = Vec::new();
     let mut tip_mm = needle().tip_mm;
+    let mut filling = scene.scene().bleb.map(|fluid| fluid.filling);
     for step in steps {
         let outcome = simulation.step(&mut Silent).unwrap_or_else(|error| panic!("{name}: {error}")).unwrap();
         let needle = Needle { tip_mm: step.tip_mm.unwrap_or(tip_mm), ..needle() };
@@ -63,7 +70,10 @@ fn run(name: &str, steps: &[Step]) -> Vec<(f64, usize)> {
         let control = pushes.map_or(Control::Pose, Control::Force);
         let asked = Request { needle, control, level: Level::Coarse, effects: sequence.effects.clone() };
         let answer = outcome.prediction;
-        let laws = broken(scene.scene(), &asked, &answer);
+        let mut told = scene.scene().clone();
+        filling = step.fluid.or(filling);
+        told.bleb = told.bleb.zip(filling).map(|(fluid, filling)| SubretinalFluid { filling, ..fluid });
+        let laws = broken(&told, &asked, &answer);
         assert!(laws.is_empty(), "{name}, {} s: {laws:?}", step.time_s);
         let iterations = answer.solver.iterations;
         assert!(iterations <= MOST_ITERATIONS, "{name}, {} s: {iterations} iterations", step.time_s);
@@ -80,6 +90,27 @@ fn steps_of_any_length_are_sound() {
     for step_s in [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 1e2, 1e3] {
         let moved = run(&format!("steps of {step_s} s"), &steps(step_s));
         assert!(moved[2].0 > 0.0, "{step_s}: nothing moves");
+    }
+}
+
+/// Fluid comes, is pressed, comes under a needle that is held, and goes, within a microsecond or a quarter of an hour each.
+#[test]
+fn fluid_within_steps_of_any_length_is_sound() {
+    let bleb = SubretinalFluid { filling: Filling::Volume(0.01), center_mm: Point3::origin(), radius_mm: 0.6 };
+    let effects = ["finite_strain", "contact", "bleb", "viscoelasticity", "inertia"];
+    for step_s in [1e-6, 1e-4, 1e-2, 1.0, 1e3] {
+        let filled = |step: Step, volume_mm3: f64| Step { fluid: Some(Filling::Volume(volume_mm3)), ..step };
+        let time = |count: usize| count as f64 * step_s;
+        let steps = [
+            filled(pushed(time(1), 0.0), 0.02),
+            pushed(time(2), 0.1),
+            filled(Step { time_s: time(3), ..Step::default() }, 0.025),
+            filled(pushed(time(4), 0.0), 0.01),
+            filled(pushed(time(5), 0.0), 0.0),
+        ];
+        let scene = Scene { bleb: Some(bleb), ..built_in("macula") };
+        let moved = run_in(scene, &effects, &format!("fluid in steps of {step_s} s"), &steps);
+        assert!(moved.iter().all(|(moved_um, _)| *moved_um > 0.0), "{step_s}: nothing moves");
     }
 }
 
