@@ -5,13 +5,13 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 use retina_core::equilibrium::bleb::VOLUME_TOLERANCE;
 use retina_core::predict::types::BlebReport;
-use retina_core::predict::{ContactState, EffectChoice, Level, PredictError, PreparedScene};
+use retina_core::predict::{ContactState, EffectChoice, Level, PredictError, Prediction, PreparedScene, Request};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
 use retina_core::scene::bleb::{Filling, SubretinalFluid};
 use retina_core::sequence::{LASTING, Sequence, SequenceError, Simulation, Step, StepOutcome};
 
-use crate::support::{ask, built_in, largest_um, straight};
+use crate::support::{ask, built_in, largest_um, outcomes, straight};
 
 /// Radius of the detached disc (mm).
 const RADIUS_MM: f64 = 0.6;
@@ -44,13 +44,9 @@ fn injected(time_s: f64, volume_mm3: f64) -> Step {
     Step { fluid: Some(Filling::Volume(volume_mm3)), ..pushed(time_s, 0.0) }
 }
 
-fn run(scene: &Arc<PreparedScene>, sequence: &Sequence) -> Vec<StepOutcome> {
-    let mut simulation = Simulation::new(scene, sequence, &mut Silent).unwrap();
-    let mut outcomes = Vec::new();
-    while let Some(outcome) = simulation.step(&mut Silent).unwrap() {
-        outcomes.push(outcome);
-    }
-    outcomes
+/// The prediction of a push of its own, without what remembers.
+fn alone(scene: &PreparedScene, force_mn: f64) -> Prediction {
+    ask(scene, &Request { effects: named(&STATIC), ..straight(Level::Coarse, force_mn) }).unwrap()
 }
 
 fn refused(scene: &Arc<PreparedScene>, sequence: &Sequence) -> (usize, PredictError) {
@@ -68,12 +64,10 @@ fn bleb(outcome: &StepOutcome) -> BlebReport {
 fn without_memory_a_step_over_fluid_is_its_prediction() {
     let scene = filled(0.02);
     let steps = vec![pushed(1.0, 0.0), pushed(2.0, 0.2), pushed(3.0, 0.6), pushed(4.0, 0.0)];
-    for (outcome, force_mn) in run(&scene, &sequence(named(&STATIC), steps)).iter().zip([0.0, 0.2, 0.6, 0.0]) {
-        let mut request = straight(Level::Coarse, force_mn);
-        request.effects = named(&STATIC);
-        let alone = ask(&scene, &request).unwrap();
+    for (outcome, force_mn) in outcomes(&scene, &sequence(named(&STATIC), steps), None).iter().zip([0.0, 0.2, 0.6, 0.0])
+    {
+        let alone = alone(&scene, force_mn);
         assert!(bleb(outcome).pressure_kpa > 0.0 && largest_um(&alone) > 10.0, "{force_mn} mN");
-        // The needle comes back to where the last step left it, a little above or below; the same motion from there is the same equilibrium.
         let apart = outcome.prediction.vertices.iter().zip(&alone.vertices).map(|(a, b)| (a - b).norm());
         let apart_um = 1e3 * apart.fold(0.0, f64::max);
         println!("{force_mn} mN: {apart_um:.2e} µm apart, {} iterations", outcome.prediction.solver.iterations);
@@ -87,15 +81,9 @@ fn what_is_injected_is_there_and_what_is_drawn_off_is_not() {
     let scene = filled(0.005);
     let volumes = [0.01, 0.02, 0.04, 0.01, 0.0];
     let steps = (1..).map(f64::from).zip(volumes).map(|(time_s, volume_mm3)| injected(time_s, volume_mm3));
-    let outcomes = run(&scene, &sequence(named(&STATIC), steps.collect()));
+    let outcomes = outcomes(&scene, &sequence(named(&STATIC), steps.collect()), None);
     for (outcome, volume_mm3) in outcomes.iter().zip(&volumes[..4]) {
-        let alone = ask(&filled(*volume_mm3), &{
-            let mut request = straight(Level::Coarse, 0.0);
-            request.effects = named(&STATIC);
-            request
-        })
-        .unwrap();
-        let (there, told) = (largest_um(&outcome.prediction), largest_um(&alone));
+        let (there, told) = (largest_um(&outcome.prediction), largest_um(&alone(&filled(*volume_mm3), 0.0)));
         println!("{volume_mm3} mm³: {:.4} kPa, up to {there:.3} µm", bleb(outcome).pressure_kpa);
         assert!((bleb(outcome).volume_mm3 / volume_mm3 - 1.0).abs() <= VOLUME_TOLERANCE);
         assert!((there / told - 1.0).abs() < 1e-3, "as the bleb of a scene that has so much: {there} and {told} µm");
@@ -115,7 +103,7 @@ fn tissue_relaxes_over_what_is_injected() {
         steps[0].fluid = Some(Filling::Volume(0.02));
         sequence(EffectChoice::Auto, steps)
     };
-    let fast = run(&scene, &auto(&[0.1, 1.0, 10.0, 1000.0, 1900.0]));
+    let fast = outcomes(&scene, &auto(&[0.1, 1.0, 10.0, 1000.0, 1900.0]), None);
     let kpa: Vec<f64> = fast.iter().map(|outcome| bleb(outcome).pressure_kpa).collect();
     // Without memory, on the mesh of those that have it.
     let lasting = sequence(named(&STATIC), vec![pushed(1.0, 0.0), injected(2.0, 0.02)]);
@@ -131,7 +119,7 @@ fn tissue_relaxes_over_what_is_injected() {
     }
     // Under the fluid of a scene the tissue has been for ever.
     let names = ["finite_strain", "contact", "bleb", "viscoelasticity"];
-    let still = run(&scene, &sequence(named(&names), vec![pushed(0.1, 0.0), pushed(1.0, 0.0)]));
+    let still = outcomes(&scene, &sequence(named(&names), vec![pushed(0.1, 0.0), pushed(1.0, 0.0)]), None);
     let [first, second] = [0, 1].map(|at: usize| bleb(&still[at]).pressure_kpa);
     assert!((first / second - 1.0).abs() < 1e-6, "nothing creeps: {first} and {second} kPa");
 }
@@ -145,7 +133,7 @@ fn a_needle_rubs_over_fluid() {
     let steps =
         (0..4).map(|at| Step { time_s: f64::from(at + 1), tip_mm: tip(0.02 * f64::from(at)), ..Step::default() });
     let names = ["finite_strain", "contact", "bleb", "friction", "puncture"];
-    let outcomes = run(&scene, &sequence(named(&names), steps.collect()));
+    let outcomes = outcomes(&scene, &sequence(named(&names), steps.collect()), None);
     for outcome in &outcomes {
         let reaction = outcome.prediction.needle.reaction_mn;
         println!("{:?} mN, {:?}", reaction, outcome.prediction.contact.slipping_share);

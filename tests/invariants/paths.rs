@@ -5,7 +5,6 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 use retina_core::equilibrium::error::EquilibriumError;
 use retina_core::needle::{Needle, NeedleShape};
-use retina_core::predict::finite_element::Resolution;
 use retina_core::predict::{Control, EffectChoice, Level, PredictError, Prediction, PreparedScene, Request};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
@@ -13,7 +12,7 @@ use retina_core::sequence::{LASTING, Sequence, SequenceError, Simulation, Step, 
 use retina_core::tissue::RetinalBond;
 use retina_tests::tolerance::DISCRETISATION;
 
-use crate::support::{ask, at, force, largest_um, requests, straight};
+use crate::support::{ask, at, force, largest_um, outcomes, requests, straight};
 
 fn changed(name: &str, change: impl FnOnce(&mut Scene)) -> Arc<PreparedScene> {
     let mut scene = Scene::built_in(name).unwrap();
@@ -40,15 +39,6 @@ fn sequence(effects: EffectChoice, steps: Vec<Step>) -> Sequence {
 
 fn held(time_s: f64, x_mm: f64, depth_mm: f64) -> Step {
     Step { time_s, tip_mm: Some(Point3::new(x_mm, 0.0, -depth_mm)), ..Step::default() }
-}
-
-fn run(scene: &Arc<PreparedScene>, sequence: &Sequence, resolution: Option<&Resolution>) -> Vec<StepOutcome> {
-    let mut simulation = Simulation::at(scene, sequence, resolution, &mut Silent).unwrap();
-    let mut outcomes = Vec::new();
-    while let Some(outcome) = simulation.step(&mut Silent).unwrap_or_else(|error| panic!("{error}: {sequence:?}")) {
-        outcomes.push(outcome);
-    }
-    outcomes
 }
 
 /// The reaction's part along x over that along z: what drags over what presses.
@@ -85,8 +75,8 @@ fn a_dragged_needle_sticks_slips_and_sticks_again_when_it_turns_back() {
     let back = (0..12).rev().map(|k| 0.01 * f64::from(k));
     let places: Vec<f64> = out.chain([0.12]).chain(back).collect();
     let steps = path(&places, DEPTH_MM);
-    let rough_run = run(&rough(coefficient), &sequence(named(&["friction"]), steps.clone()), None);
-    let smooth = run(&rough(0.0), &sequence(named(&["friction"]), steps.clone()), Some(&LASTING));
+    let rough_run = outcomes(&rough(coefficient), &sequence(named(&["friction"]), steps.clone()), None);
+    let smooth = outcomes(&rough(0.0), &sequence(named(&["friction"]), steps.clone()), Some(&LASTING));
     let lean_of_friction: Vec<f64> = rough_run.iter().zip(&smooth).map(|(a, b)| lean(a) - lean(b)).collect();
     println!("{lean_of_friction:.4?}");
     // It sticks: the tissue goes along, and what drags it grows; then it slips at µ N.
@@ -125,7 +115,7 @@ fn a_drag_costs_the_same_in_few_steps_and_in_many_with_memory_and_without() {
                 let share = k as f64 / steps as f64;
                 held(1.0 + 0.5 * share, 0.05 * share, DEPTH_MM)
             }));
-            run(&scene, &sequence(named(extra), list), None).pop().unwrap()
+            outcomes(&scene, &sequence(named(extra), list), None).pop().unwrap()
         };
         let (few, many) = (run_in(2), run_in(10));
         println!("{extra:?}: drag {:.5} mN in 2 steps, {:.5} in 10", drag_mn(&few), drag_mn(&many));
@@ -134,7 +124,7 @@ fn a_drag_costs_the_same_in_few_steps_and_in_many_with_memory_and_without() {
     }
     // The way does matter: one that overshot and came back ends otherwise.
     let places =
-        |places: &[f64]| run(&scene, &sequence(named(&["friction"]), path(places, DEPTH_MM)), None).pop().unwrap();
+        |places: &[f64]| outcomes(&scene, &sequence(named(&["friction"]), path(places, DEPTH_MM)), None).pop().unwrap();
     let (straight, overshot) = (places(&[0.0, 0.05]), places(&[0.0, 0.08, 0.05]));
     assert!(drag_mn(&straight) < 0.0 && drag_mn(&overshot) > 0.0);
     assert!(apart_um(&straight, &overshot) > 5.0);
@@ -148,7 +138,7 @@ fn a_turning_needle_drags_the_tissue_round_with_it() {
         let turn = Step { time_s: 2.0, orientation: Some(about * start), ..Step::default() };
         let steps = vec![held(1.0, 0.0, DEPTH_MM), turn];
         let names = if coefficient > 0.0 { &["friction"][..] } else { &[] };
-        run(&rough(coefficient), &sequence(named(names), steps), None).pop().unwrap()
+        outcomes(&rough(coefficient), &sequence(named(names), steps), None).pop().unwrap()
     };
     // The mean turn of the four nodes at the edge of the contact (radians).
     let spin = |outcome: &StepOutcome, against: &StepOutcome| -> f64 {
@@ -177,7 +167,7 @@ fn the_first_step_with_every_effect_is_the_single_prediction() {
         let step = Step { time_s: 10.0, force_mn: Some(force(&request)), ..Step::default() };
         let sequence =
             Sequence { needle: request.needle, steps: vec![step], level: Level::Coarse, effects: EffectChoice::Auto };
-        let stepped = run(&scene, &sequence, None).remove(0).prediction;
+        let stepped = outcomes(&scene, &sequence, None).remove(0).prediction;
         let numbers = |p: &Prediction| format!("{:?} {:?} {:?} {:?}", p.vertices, p.needle, p.contact, p.solver);
         assert_eq!(numbers(&stepped), numbers(&alone), "{request:?}");
         let on = |p: &Prediction, name: &str| p.effects.iter().any(|e| e.name == name && e.simulated);
@@ -197,7 +187,7 @@ fn tissue_has_been_at_rest_under_its_pressure_for_ever() {
         .iter()
         .map(|&time_s| Step { time_s, force_mn: Some(Vector3::zeros()), ..Step::default() })
         .collect();
-    let quiet = run(&scene, &sequence(remembering.clone(), quiet), None);
+    let quiet = outcomes(&scene, &sequence(remembering.clone(), quiet), None);
     let sunk: Vec<f64> = quiet.iter().map(|outcome| largest_um(&outcome.prediction)).collect();
     let alone =
         ask(&scene, &Request { control: Control::Force(Vector3::zeros()), ..straight(Level::Coarse, 0.0) }).unwrap();
@@ -216,8 +206,8 @@ fn tissue_has_been_at_rest_under_its_pressure_for_ever() {
         time_s,
         ..Step::default()
     });
-    let pressed = run(&scene, &sequence(remembering, presses.to_vec()), None);
-    let elastic = run(&scene, &sequence(named(&["pressure"]), presses[..1].to_vec()), Some(&LASTING));
+    let pressed = outcomes(&scene, &sequence(remembering, presses.to_vec()), None);
+    let elastic = outcomes(&scene, &sequence(named(&["pressure"]), presses[..1].to_vec()), Some(&LASTING));
     let reaction = |outcome: &StepOutcome| outcome.prediction.needle.reaction_mn.z;
     assert!(reaction(&pressed[0]) > 1.5 * reaction(&elastic[0]), "{}", reaction(&pressed[0]));
     assert!((reaction(&pressed[2]) / reaction(&elastic[0]) - 1.0).abs() < 1e-3);
@@ -246,7 +236,7 @@ fn what_has_let_go_never_heals() {
         held(5.0, 0.0, 0.16),
         held(6.0, 0.0, 0.2),
     ];
-    let adhering = |scene: &Arc<PreparedScene>| run(scene, &sequence(named(&["adhesion"]), steps.clone()), None);
+    let adhering = |scene: &Arc<PreparedScene>| outcomes(scene, &sequence(named(&["adhesion"]), steps.clone()), None);
     let outcomes = adhering(&weak(0.0));
     let damages: Vec<f64> = outcomes.iter().map(damage).collect();
     let reactions: Vec<f64> = outcomes.iter().map(|outcome| outcome.prediction.needle.reaction_mn.z).collect();
@@ -270,7 +260,7 @@ fn what_has_let_go_never_heals() {
 #[test]
 fn a_bond_holds_more_against_haste_and_no_more_against_patience() {
     let pushed = |scene: &Arc<PreparedScene>, time_s: f64| {
-        damage(&run(scene, &sequence(named(&["adhesion"]), vec![held(time_s, 0.0, 0.16)]), None)[0])
+        damage(&outcomes(scene, &sequence(named(&["adhesion"]), vec![held(time_s, 0.0, 0.16)]), None)[0])
     };
     let (rated, plain) = (weak(0.5), weak(0.0));
     let lasting = pushed(&plain, 1.0);

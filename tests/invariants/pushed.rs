@@ -7,7 +7,9 @@ use retina_core::needle::{Needle, NeedleShape};
 use retina_core::predict::{EffectChoice, Level, PredictError, PreparedScene};
 use retina_core::progress::{Progress, Silent};
 use retina_core::scene::Scene;
-use retina_core::sequence::{Sequence, Simulation, Step, StepError, StepOutcome};
+use retina_core::sequence::{Sequence, Simulation, Step, StepError};
+
+use crate::support::outcomes;
 
 fn rough(coefficient: f64) -> Arc<PreparedScene> {
     let scene = Scene { friction_coefficient: coefficient, ..Scene::built_in("flat").unwrap() };
@@ -40,22 +42,13 @@ fn drag() -> Vec<Step> {
     steps
 }
 
-fn listed(scene: &Arc<PreparedScene>, sequence: &Sequence) -> Vec<StepOutcome> {
-    let mut simulation = Simulation::new(scene, sequence, &mut Silent).unwrap();
-    let mut outcomes = Vec::new();
-    while let Some(outcome) = simulation.step(&mut Silent).unwrap() {
-        outcomes.push(outcome);
-    }
-    outcomes
-}
-
 #[test]
 fn steps_that_come_one_by_one_are_the_listed_ones() {
     let scene = rough(0.3);
     let round = NeedleShape::hemispherical(0.257);
     for effects in [&["friction", "viscoelasticity", "adhesion"][..], &["inertia"], &[]] {
         let sequence = sequence(round, effects, &drag());
-        let listed = listed(&scene, &sequence);
+        let listed = outcomes(&scene, &sequence, None);
         let mut simulation = Simulation::new(&scene, &sequence, &mut Silent).unwrap();
         for (step, listed) in drag().iter().zip(&listed) {
             assert_eq!(&simulation.advance_to(step, &mut Silent).unwrap(), listed, "{effects:?}");
@@ -69,7 +62,7 @@ fn a_rehearsal_of_what_is_farthest_and_deepest_plans_the_same() {
     let round = NeedleShape::hemispherical(0.257);
     let effects = ["friction", "viscoelasticity"];
     let steps = &drag()[..6];
-    let listed = listed(&scene, &sequence(round, &effects, steps));
+    let listed = outcomes(&scene, &sequence(round, &effects, steps), None);
     let rehearsal = sequence(round, &effects, &[held(0.1, 0.0, 0.06), held(0.2, 0.05, 0.06)]);
     let mut simulation = Simulation::new(&scene, &rehearsal, &mut Silent).unwrap();
     for (step, listed) in steps.iter().zip(&listed) {
@@ -99,7 +92,7 @@ impl Progress for Impatient {
 fn a_step_that_cannot_be_changes_nothing() {
     let scene = rough(0.3);
     let sequence = sequence(NeedleShape::hemispherical(0.257), &["friction", "viscoelasticity"], &drag());
-    let listed = listed(&scene, &sequence);
+    let listed = outcomes(&scene, &sequence, None);
     let mut simulation = Simulation::new(&scene, &sequence, &mut Silent).unwrap();
     for (step, listed) in drag().iter().zip(&listed) {
         let (now_s, next_s) = (simulation.time_s(), step.time_s);

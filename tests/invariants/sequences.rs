@@ -4,14 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 use retina_core::needle::{Needle, NeedleShape};
-use retina_core::predict::finite_element::Resolution;
 use retina_core::predict::{ContactState, EffectChoice, Level, PreparedScene};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
 use retina_core::sequence::{LASTING, Sequence, SequenceError, Simulation, Step, StepOutcome};
 use retina_core::tissue::rate::PronyTerm;
 
-use crate::support::{ask, built_in, force, largest_um, requests, straight};
+use crate::support::{ask, built_in, force, largest_um, outcomes, requests, straight};
 
 /// Effects without memory.
 const STATIC: [&str; 3] = ["elasticity", "finite_strain", "contact"];
@@ -41,16 +40,7 @@ fn held(time_s: f64, x_mm: f64, depth_mm: f64) -> Step {
 }
 
 fn run(scene: &Arc<PreparedScene>, sequence: &Sequence) -> Vec<StepOutcome> {
-    run_on(scene, sequence, None)
-}
-
-fn run_on(scene: &Arc<PreparedScene>, sequence: &Sequence, resolution: Option<&Resolution>) -> Vec<StepOutcome> {
-    let mut simulation = Simulation::at(scene, sequence, resolution, &mut Silent).unwrap();
-    let mut outcomes = Vec::new();
-    while let Some(outcome) = simulation.step(&mut Silent).unwrap_or_else(|error| panic!("{error}: {sequence:?}")) {
-        outcomes.push(outcome);
-    }
-    outcomes
+    outcomes(scene, sequence, None)
 }
 
 fn prepared(scene: Scene) -> Arc<PreparedScene> {
@@ -166,7 +156,7 @@ fn held_tissue_relaxes_from_stiff_to_the_elastic_answer() {
     let scene = built_in("flat");
     let times = [1e-6, 1e-3, 0.1, 1.0, 10.0, 100.0, 1000.0, 2000.0];
     let steps: Vec<Step> = times.iter().map(|&time_s| held(time_s, 0.0, 0.06)).collect();
-    let elastic = reaction(&run_on(&scene, &sequence(with(&[]), vec![steps[0]]), Some(&LASTING))[0]);
+    let elastic = reaction(&outcomes(&scene, &sequence(with(&[]), vec![steps[0]]), Some(&LASTING))[0]);
     let relaxing = run(&scene, &sequence(with(&["viscoelasticity"]), steps));
     let forces: Vec<f64> = relaxing.iter().map(reaction).collect();
     assert!(forces.windows(2).all(|pair| pair[1] < pair[0]), "{forces:?}");

@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use retina_core::needle::{Needle, NeedleShape};
+use retina_core::predict::finite_element::Resolution;
 use retina_core::predict::{Control, EffectChoice, Level, PredictError, Prediction, PreparedScene, Request, Workspace};
 use retina_core::progress::Silent;
 use retina_core::scene::{Scene, SceneSurface};
+use retina_core::sequence::{Sequence, Simulation, StepOutcome};
 use retina_core::surface::TriangleMesh;
 use retina_core::working_range::WorkingRange;
 pub use retina_tests::cap::cap;
@@ -67,6 +69,16 @@ pub fn force(request: &Request) -> Vector3<f64> {
         Control::Force(force) => force,
         Control::Pose => panic!("not under force control"),
     }
+}
+
+/// The outcomes of a sequence's own steps, at its level's resolution or this one.
+pub fn outcomes(scene: &Arc<PreparedScene>, sequence: &Sequence, resolution: Option<&Resolution>) -> Vec<StepOutcome> {
+    let mut simulation = Simulation::at(scene, sequence, resolution, &mut Silent).unwrap();
+    let mut outcomes = Vec::new();
+    while let Some(outcome) = simulation.step(&mut Silent).unwrap_or_else(|error| panic!("{error}: {sequence:?}")) {
+        outcomes.push(outcome);
+    }
+    outcomes
 }
 
 /// The largest displacement of a node (µm).

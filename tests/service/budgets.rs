@@ -40,7 +40,7 @@ fn a_needle_that_does_not_touch_is_exact_at_any_level() {
     assert_eq!(answer["accuracy"]["expected_error_um"], json!({"median": 0.0, "p95": 0.0}));
 }
 
-/// What an answer takes around its prediction counts too: by the service's own clock, deadlines that it takes on are kept but for one in a hundred.
+/// What an answer takes around its prediction counts too: a time in which the prediction alone would be ready is not promised.
 #[test]
 fn a_deadline_counts_from_the_arrival_to_the_answer() {
     let service = Running::start(&["--threads", "1"]);

@@ -73,13 +73,9 @@ impl Bleb {
         }
     }
 
-    /// What is held of the fluid in an eye whose own pressure has changed by `eye_kpa` since its surface was measured: pressures on the tissue count from then.
-    pub fn holds(&self, eye_kpa: f64) -> Holds {
-        self.holds_from(self.pressure_kpa, eye_kpa)
-    }
-
-    /// The same, the pressure that keeps a volume sought from `start_kpa` (above that in the eye) on.
-    pub fn holds_from(&self, start_kpa: f64, eye_kpa: f64) -> Holds {
+    /// What is held of the fluid in an eye whose own pressure has changed by `eye_kpa` since its surface was measured: pressures on the tissue count from then. The pressure that keeps a
+    /// volume is sought from `start_kpa` (above that in the eye) on.
+    pub fn holds(&self, start_kpa: f64, eye_kpa: f64) -> Holds {
         let force_mn = self.pressure_kpa * disc_mm2(self.radius_mm);
         match self.keeps_volume {
             true => Holds::Volume(Multiplier::new(start_kpa + eye_kpa, self.volume_mm3, force_mn)),

@@ -57,8 +57,7 @@ impl Held {
 
     /// The fluid of `problem`, if it has any.
     pub fn fluid(&self, problem: &Problem) -> Option<Fluid<'_>> {
-        let holds = problem.bleb?.holds(problem.pressure_kpa.unwrap_or_default());
-        Some(Fluid { detached: &self.detached, holds })
+        problem.fluid(&self.detached, None)
     }
 
     /// The largest damage of the bond at `positions`, outside of a bleb.
@@ -76,6 +75,13 @@ impl Held {
 }
 
 impl Problem<'_> {
+    /// Its fluid, on these faces of the interface, after a step that left it at the pressure `before_kpa` above that in the eye; `None` where there is none of it.
+    pub(crate) fn fluid<'a>(&self, detached: &'a [bool], before_kpa: Option<f64>) -> Option<Fluid<'a>> {
+        let bleb = self.bleb.filter(|bleb| !bleb.is_empty())?;
+        let start_kpa = before_kpa.unwrap_or(bleb.pressure_kpa);
+        Some(Fluid { detached, holds: bleb.holds(start_kpa, self.pressure_kpa.unwrap_or_default()) })
+    }
+
     /// What the answer tells of the fluid at `positions`: its pressure counts from that in the eye.
     pub(crate) fn told_of(&self, fluid: &Fluid, wall: &Wall, positions: &[f64]) -> BlebReport {
         BlebReport {

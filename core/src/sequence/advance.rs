@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::fluid::{check_filling, poured};
+use super::fluid::check_filling;
 use super::history::History;
 use super::plan::{fits, outside, pressed};
 use super::{Laid, Settled, Simulation, Step};
@@ -52,8 +52,9 @@ impl Simulation {
         // Taken out so that the question may borrow them while the rest changes.
         let (prepared, body, patch) = (Arc::clone(&self.prepared), self.body, self.patch.clone());
         let question = Question::new(&prepared, &request, &body, CutOrGrid::Grid(&patch)).filled(filling);
-        let linear = pressed(&question, &question.with_fluid(self.plan.dry.clone()))?;
-        let (met, unforeseen) = self.met(&question, linear.as_ref())?;
+        let sink = question.with_fluid(self.plan.dry.clone());
+        let linear = pressed(&question, &sink)?;
+        let (met, unforeseen) = self.met(&question, linear.as_ref(), &sink)?;
         let linear = linear.filter(|_| self.decision.contact);
         let moves = linear.is_some() || self.is_strained(&question);
         let (mut prediction, laid) = if moves && (self.decision.contact || self.decision.bleb) {
@@ -180,7 +181,7 @@ impl Simulation {
         // Where nothing is remembered, the retina is held as in a single prediction.
         let held = if self.state.history.is_none() { Held::new(&problem, &wall) } else { None };
         let adhesion = held.as_ref().map(Held::adhesion);
-        let fluid = poured(&problem, &detached, self.state.fluid_kpa);
+        let fluid = problem.fluid(&detached, self.state.fluid_kpa);
         pressing.extend(adhesion.iter().map(|effect| Addition { effect, place: Place::Interface }));
         pressing.extend(fluid.iter().map(|effect| Addition { effect, place: Place::Interface }));
         let withdrawn = question.motion.force_mn == Some(0.0) || !self.decision.contact;
@@ -246,7 +247,7 @@ impl Simulation {
         let tissue = &self.prepared.scene().tissue;
         let rest = &wall.geometry.rest;
         let mut history = History::at_rest(self.rates, &self.decision, tissue, wall.topology(), rest, detached);
-        let fluid = poured(problem, detached, None);
+        let fluid = problem.fluid(detached, None);
         if fluid.is_some() || (self.rates.any() && !pressing.is_empty()) {
             progress.stage("equilibrium");
             let motion = Motion { direction: Vector3::z_axis(), force_mn: None, travel_mm: WITHDRAWN_MM };

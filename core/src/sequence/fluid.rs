@@ -1,13 +1,12 @@
-//! Fluid under the retina during a motion: how much of it there may be, over which disc the needle may press, and the effect of one step.
+//! Fluid under the retina during a motion: how much of it there may be, and where the needle may press.
 //!
 //! The disc is the scene's, and stays as wide as it is; what a step tells is what is on it at the step's time. A disc without fluid is detached all the same: its retina lies on what is below.
 //! Not here: the equilibrium over fluid (`equilibrium::bleb`), a single prediction (`predict::over_fluid`).
 
 use super::Step;
 use super::plan::Plan;
-use crate::effects::bleb::Fluid;
 use crate::needle::Body;
-use crate::predict::finite_element::{ContactEstimate, Problem, Resolution};
+use crate::predict::finite_element::{ContactEstimate, Resolution};
 use crate::predict::over_fluid::check_over;
 use crate::predict::{PredictError, PreparedScene};
 use crate::scene::bleb::Filling;
@@ -55,11 +54,4 @@ pub(super) fn fullest(prepared: &PreparedScene, steps: &[Step]) -> Option<Fillin
     let own = prepared.scene().bleb?.filling;
     let all = steps.iter().filter_map(|step| step.fluid).chain([own]);
     all.max_by(|a, b| prepared.volume_mm3(*a).total_cmp(&prepared.volume_mm3(*b)))
-}
-
-/// The fluid of `problem`, on these faces of the interface, after a step that left it at the pressure `before_kpa` above that in the eye; `None` where there is none of it.
-pub(super) fn poured<'a>(problem: &Problem, detached: &'a [bool], before_kpa: Option<f64>) -> Option<Fluid<'a>> {
-    let bleb = problem.bleb.filter(|bleb| !bleb.is_empty())?;
-    let start_kpa = before_kpa.unwrap_or(bleb.pressure_kpa);
-    Some(Fluid { detached, holds: bleb.holds_from(start_kpa, problem.pressure_kpa.unwrap_or_default()) })
 }

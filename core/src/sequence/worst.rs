@@ -69,14 +69,14 @@ impl Simulation {
         &self,
         question: &Question,
         linear: Option<&LinearAnswer>,
+        sink: &Sink,
     ) -> Result<(Worst, Vec<String>), PredictError> {
         let mut met = self.state.met;
-        let sink = question.with_fluid(self.plan.dry.clone());
-        met.meet(question, linear, &sink);
+        met.meet(question, linear, sink);
         if self.sequence.effects != EffectChoice::Auto {
             return Ok((met, Vec::new()));
         }
-        let called_for = question.decide(met.expected, &sink)?;
+        let called_for = question.decide(met.expected, sink)?;
         let planned = |name: &str| self.effects().iter().any(|report| report.name == name && report.simulated);
         let missed = called_for.reports.iter().filter(|report| report.simulated);
         let told = missed.filter(|report| !planned(report.name)).map(|report| {
