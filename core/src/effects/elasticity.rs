@@ -30,8 +30,9 @@ impl Elasticity<'_> {
     fn strains(&self, local: &Local) -> ([Matrix3<f64>; POINTS], [f64; POINTS]) {
         let mut strain = [Matrix3::zeros(); POINTS];
         let mut trace = [0.0; POINTS];
+        let f = self.geometry.deformation_gradients(local.group, local.current);
         for q in 0..POINTS {
-            let h = self.geometry.deformation_gradient(local.group, q, local.current) - Matrix3::identity();
+            let h = f[q] - Matrix3::identity();
             strain[q] = (h + h.transpose()) * 0.5;
             trace[q] = h.trace();
         }

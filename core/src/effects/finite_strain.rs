@@ -64,18 +64,16 @@ impl FiniteStrain<'_> {
     #[inline(always)]
     fn points(&self, local: &Local) -> Option<Points> {
         let mut out = Points {
-            f: [Matrix3::identity(); POINTS],
+            f: self.geometry.deformation_gradients(local.group, local.current),
             f_inverse_transposed: [Matrix3::identity(); POINTS],
             j: [1.0; POINTS],
             theta: [1.0; POINTS],
         };
         for q in 0..POINTS {
-            let f = self.geometry.deformation_gradient(local.group, q, local.current);
-            let (j, cofactor) = determinant_and_cofactor(&f);
+            let (j, cofactor) = determinant_and_cofactor(&out.f[q]);
             if j.is_nan() || j <= 0.0 {
                 return None;
             }
-            out.f[q] = f;
             out.j[q] = j;
             out.f_inverse_transposed[q] = cofactor / j;
         }
@@ -138,10 +136,10 @@ impl FiniteStrain<'_> {
     #[inline(always)]
     fn predict_pressure_n(&self, local: &Local, step: &[f64], out: &mut [f64]) {
         let Some(points) = self.points(local) else { return };
+        let moved = self.geometry.deformation_gradients(local.group, step);
         let mut change = [0.0; POINTS];
         for q in 0..POINTS {
-            let df = self.geometry.deformation_gradient(local.group, q, step);
-            change[q] = points.j[q] * points.f_inverse_transposed[q].dot(&df);
+            change[q] = points.j[q] * points.f_inverse_transposed[q].dot(&moved[q]);
         }
         let change = self.geometry.project(local.group, &change);
         let mut pressure = [0.0; POINTS];

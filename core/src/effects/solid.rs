@@ -20,6 +20,9 @@ pub use stiffness::{PointRows, StiffnessCoefficients, Volumetric};
 /// One number per node for each component: a row of shape function gradients.
 pub type NodeRows = [[f64; NODES]; 3];
 
+/// Numbers that are computed together: loops over them become vector instructions.
+const LANES: usize = 4;
+
 /// A step may shrink no element's volume at a point below this fraction of what it was.
 const SMALLEST_VOLUME_RATIO: f64 = 0.1;
 
@@ -114,14 +117,21 @@ impl SolidGeometry {
     /// Deformation gradient F = Σ xₐ ⊗ Gₐ at one point.
     #[inline(always)]
     pub fn deformation_gradient(&self, element: usize, point: usize, current: &[f64]) -> Matrix3<f64> {
-        let gradients = self.gradients(element, point);
-        let position = current.as_chunks::<NODES>().0;
-        // A loop and not `from_fn`: its closure is not inlined and would leave the vector instructions behind.
-        let mut f = Matrix3::zeros();
-        for i in 0..3 {
-            for k in 0..3 {
-                f[(i, k)] = dot(&position[i], &gradients[k]);
-            }
+        summed(&products_in_parts(current, self.gradients(element, point)))
+    }
+
+    /// The same at every point of an element.
+    #[inline(always)]
+    pub fn deformation_gradients(&self, element: usize, current: &[f64]) -> [Matrix3<f64>; POINTS] {
+        // The parts are added up in a loop of their own: in one with the products, the compiler packs entries and not parts.
+        let mut parts = [[[[0.0; LANES]; 3]; 3]; POINTS];
+        for (q, parts) in parts.iter_mut().enumerate() {
+            *parts = products_in_parts(current, self.gradients(element, q));
+        }
+        // Loops and not `map`: a closure that is not inlined would leave the vector instructions behind.
+        let mut f = [Matrix3::zeros(); POINTS];
+        for (f, parts) in f.iter_mut().zip(&parts) {
+            *f = summed(parts);
         }
         f
     }
@@ -130,10 +140,10 @@ impl SolidGeometry {
     #[inline(always)]
     pub(super) fn max_step(&self, local: &Local, step: &[f64]) -> f64 {
         let mut largest = 1.0_f64;
-        for q in 0..POINTS {
-            let f = self.deformation_gradient(local.group, q, local.current);
-            let df = self.deformation_gradient(local.group, q, step);
-            let (j, _) = determinant_and_cofactor(&f);
+        let now = self.deformation_gradients(local.group, local.current);
+        let change = self.deformation_gradients(local.group, step);
+        for (f, df) in now.iter().zip(&change) {
+            let (j, _) = determinant_and_cofactor(f);
             while largest > f64::EPSILON && determinant_and_cofactor(&(f + df * largest)).0 <= SMALLEST_VOLUME_RATIO * j
             {
                 largest *= 0.7;
@@ -171,27 +181,54 @@ impl SolidGeometry {
     #[inline(always)]
     pub fn add_force(&self, element: usize, stress: &[Matrix3<f64>; POINTS], out: &mut [f64]) {
         let rows = out.as_chunks_mut::<NODES>().0;
-        for (q, p) in stress.iter().enumerate().take(POINTS) {
-            let g = self.gradients(element, q);
-            for i in 0..3 {
-                for a in 0..NODES {
-                    rows[i][a] += p[(i, 0)] * g[0][a] + p[(i, 1)] * g[1][a] + p[(i, 2)] * g[2][a];
+        for chunk in 0..NODES / LANES {
+            let mut sum = [0, 1, 2].map(|i: usize| rows[i].as_chunks::<LANES>().0[chunk]);
+            for (q, p) in stress.iter().enumerate() {
+                let gradients = self.gradients(element, q);
+                let g = [0, 1, 2].map(|k: usize| gradients[k].as_chunks::<LANES>().0[chunk]);
+                for i in 0..3 {
+                    for lane in 0..LANES {
+                        sum[i][lane] += p[(i, 0)] * g[0][lane] + p[(i, 1)] * g[1][lane] + p[(i, 2)] * g[2][lane];
+                    }
                 }
+            }
+            for i in 0..3 {
+                rows[i].as_chunks_mut::<LANES>().0[chunk] = sum[i];
             }
         }
     }
 }
 
-/// Sum of products in four interleaved parts, so that it vectorises.
+/// Products of each component of the nodes' positions with each of their gradients' at one point, added up in four interleaved parts.
 #[inline(always)]
-fn dot(a: &[f64; NODES], b: &[f64; NODES]) -> f64 {
-    let mut parts = [0.0; 4];
-    for (a, b) in a.as_chunks::<4>().0.iter().zip(b.as_chunks::<4>().0) {
-        for k in 0..4 {
-            parts[k] += a[k] * b[k];
+fn products_in_parts(current: &[f64], gradients: &NodeRows) -> [[[f64; LANES]; 3]; 3] {
+    let position = current.as_chunks::<NODES>().0;
+    let mut sum = [[[0.0; LANES]; 3]; 3];
+    for chunk in 0..NODES / LANES {
+        for i in 0..3 {
+            for k in 0..3 {
+                let x = &position[i].as_chunks::<LANES>().0[chunk];
+                let g = &gradients[k].as_chunks::<LANES>().0[chunk];
+                for lane in 0..LANES {
+                    sum[i][k][lane] += x[lane] * g[lane];
+                }
+            }
         }
     }
-    (parts[0] + parts[1]) + (parts[2] + parts[3])
+    sum
+}
+
+/// The sum of the parts.
+#[inline(always)]
+fn summed(parts: &[[[f64; LANES]; 3]; 3]) -> Matrix3<f64> {
+    let mut f = Matrix3::zeros();
+    for i in 0..3 {
+        for k in 0..3 {
+            let part = &parts[i][k];
+            f[(i, k)] = (part[0] + part[1]) + (part[2] + part[3]);
+        }
+    }
+    f
 }
 
 /// Determinant of a 3 × 3 matrix and its cofactor matrix J F⁻ᵀ.

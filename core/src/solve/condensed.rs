@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 
 use super::border::Drive;
 use super::dense::Dense;
-use super::newton::{NewtonError, System, Workspace};
+use super::newton::{System, Workspace};
 use super::sparse::norm;
 use crate::assemble::Predicted;
 use crate::assemble::tail::{Stresses, Tail};
@@ -71,10 +71,7 @@ impl System<'_> {
     }
 
     /// From the Newton step `newton` (free unknowns, then the border) at `positions` the one that meets the effects on the tail as they are at its end; `None`
-    /// where that is not to be had. The driven vertex moves by no more than `max_travel_mm`.
-    ///
-    /// # Errors
-    /// [`NewtonError::Linear`].
+    /// where that is not to be had. The driven vertex moves by no more than `max_travel_mm`. Its linear solution is not checked: the step is judged by the residual that it leaves.
     pub(super) fn refine(
         &self,
         positions: &[f64],
@@ -82,20 +79,20 @@ impl System<'_> {
         drive: Drive,
         max_travel_mm: f64,
         workspace: &mut Workspace,
-    ) -> Result<Option<Vec<f64>>, NewtonError> {
+    ) -> Option<Vec<f64>> {
         let size = self.dofs.tail;
         let (free, tail) = (self.dofs.free, self.tail());
         let first = free - size;
         // What is held at a value ties the tail to all that is below: its multiplier would be one unknown more here.
         if size == 0 || workspace.condensed.whole.size() != size || !workspace.held.slope.is_empty() {
-            return Ok(None);
+            return None;
         }
         let gradient = tail.gradient(positions, &mut workspace.scratch);
         let held = &workspace.residual[free..];
         let apart = (0..3).any(|k| (held[k] - gradient[size + k]).abs() > SAME * norm(held));
         let coupling = |k: usize| &workspace.values[self.pattern.stored() + k * free..][..first];
         if apart || (0..3).any(|k| coupling(k).iter().any(|c| *c != 0.0)) {
-            return Ok(None);
+            return None;
         }
         let start = &newton[first..];
         let mut condensed = std::mem::take(&mut workspace.condensed);
@@ -112,13 +109,13 @@ impl System<'_> {
             let change: Vec<f64> = found[..size].iter().zip(start).map(|(new, old)| new - old).collect();
             let mut rest = vec![0.0; free];
             rest[first..].copy_from_slice(&condensed.whole.times(&change));
-            workspace.factor.solve(self.symbolic, self.pattern, &workspace.values, &mut rest)?;
+            workspace.factor.substitute(self.symbolic, &mut rest);
             rest.iter_mut().zip(newton).for_each(|(r, n)| *r += n);
             rest.extend_from_slice(&found[size..]);
-            Ok(rest)
+            rest
         });
         workspace.condensed = condensed;
-        refined.transpose()
+        refined
     }
 
     /// The slope of the potential along `step`.

@@ -253,7 +253,7 @@ impl System<'_> {
                 _ => workspace.condensed.forget(),
             }
             let stuck = NewtonError::NoStep { iterations: report.iterations, residual_mn: report.residual_mn };
-            let taken = match self.refine(positions, &plain.step, drive, settings.max_travel_mm, workspace)? {
+            let taken = match self.refine(positions, &plain.step, drive, settings.max_travel_mm, workspace) {
                 Some(refined) => {
                     let slope = self.slope(&refined, drive, workspace);
                     let refined = Step { step: refined, slope, refined: true, ..plain };
@@ -309,9 +309,9 @@ impl System<'_> {
         workspace: &mut Workspace,
     ) -> Result<bool, NewtonError> {
         let before = positions.to_vec();
-        let (plain, _) = self.step(drive, settings.max_travel_mm, workspace)?;
+        let plain = self.step_again(drive, settings.max_travel_mm, workspace)?;
         let step = if report.residual_mn > REFINED_ABOVE * settings.force_scale_mn {
-            self.refine(&before, &plain, drive, settings.max_travel_mm, workspace)?.unwrap_or(plain)
+            self.refine(&before, &plain, drive, settings.max_travel_mm, workspace).unwrap_or(plain)
         } else {
             plain
         };

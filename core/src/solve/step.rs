@@ -9,11 +9,32 @@ use super::held::Border;
 use super::newton::{NewtonError, System, Workspace};
 
 impl System<'_> {
-    /// The Newton step (free unknowns, the border, and the change of the multiplier where there is one), the travel limited, and the slope of the potential along it.
+    /// The Newton step (free unknowns, the border, and the change of the multiplier where there is one), the travel limited, and the slope of the potential along it; the
+    /// linear solution checked.
     pub(super) fn step(
         &self,
         drive: Drive,
         max_travel_mm: f64,
+        workspace: &mut Workspace,
+    ) -> Result<(Vec<f64>, f64), NewtonError> {
+        self.step_with(drive, max_travel_mm, true, workspace)
+    }
+
+    /// The same step with a factor that has solved before: the linear solution is not checked, for the step is judged by the residual that it leaves.
+    pub(super) fn step_again(
+        &self,
+        drive: Drive,
+        max_travel_mm: f64,
+        workspace: &mut Workspace,
+    ) -> Result<Vec<f64>, NewtonError> {
+        Ok(self.step_with(drive, max_travel_mm, false, workspace)?.0)
+    }
+
+    fn step_with(
+        &self,
+        drive: Drive,
+        max_travel_mm: f64,
+        checked: bool,
         workspace: &mut Workspace,
     ) -> Result<(Vec<f64>, f64), NewtonError> {
         let free = self.dofs.free;
@@ -46,7 +67,7 @@ impl System<'_> {
         };
         let corner = &workspace.values[self.pattern.stored() + 3 * free..];
         let (mut step, travels) = bordered.step(|row, column| corner[3 * row + column], max_travel_mm);
-        if changes.is_empty() {
+        if changes.is_empty() && checked {
             let mut forces: Vec<f64> = workspace.residual[..free].iter().map(|r| -r).collect();
             for (travel, coupling) in travels.iter().zip(couplings.chunks_exact(free)) {
                 forces.iter_mut().zip(coupling).for_each(|(force, coupling)| *force -= travel * coupling);

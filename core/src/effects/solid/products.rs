@@ -1,7 +1,8 @@
 //! Sums of outer products of rows of one number per node: what element matrices are made of.
 //!
-//! The sum of one block stays in registers, two of its rows at a time, while it runs over the products; the block itself is touched once. Not here: what the rows mean.
+//! The sum of one block stays in registers, a tile of four rows and up to three vectors at a time, while it runs over the products; the block itself is touched once. Not here: what the rows mean.
 
+use super::LANES;
 use crate::mesh::element::NODES;
 
 /// One number for each pair of nodes of an element.
@@ -23,48 +24,48 @@ pub(super) fn scaled_row(scale: f64, row: &[f64; NODES]) -> [f64; NODES] {
 /// Adds Σₖ left[k][a] right[k][b] of every pair to `block[a][b]`.
 #[inline(always)]
 pub(in crate::effects) fn add_products<const PAIRS: usize>(pairs: [Pair; PAIRS], block: &mut NodePairs) {
-    for a in (0..NODES).step_by(2) {
-        add_two_rows::<NODES, PAIRS>(a, &pairs, block);
+    for a in (0..NODES).step_by(LANES) {
+        add_tile::<3, PAIRS>([a, 0], &pairs, block);
+        add_tile::<2, PAIRS>([a, 3], &pairs, block);
     }
 }
 
 /// As [`add_products`], for a sum that is symmetric: what lies above the diagonal by more than a vector is left out.
 #[inline(always)]
 pub(in crate::effects) fn add_symmetric_products<const PAIRS: usize>(pairs: [Pair; PAIRS], block: &mut NodePairs) {
-    for a in [0, 2] {
-        add_two_rows::<4, PAIRS>(a, &pairs, block);
-    }
-    for a in [4, 6] {
-        add_two_rows::<8, PAIRS>(a, &pairs, block);
-    }
-    for a in [8, 10] {
-        add_two_rows::<12, PAIRS>(a, &pairs, block);
-    }
-    for a in [12, 14] {
-        add_two_rows::<16, PAIRS>(a, &pairs, block);
-    }
-    for a in [16, 18] {
-        add_two_rows::<20, PAIRS>(a, &pairs, block);
-    }
+    add_tile::<1, PAIRS>([0, 0], &pairs, block);
+    add_tile::<2, PAIRS>([4, 0], &pairs, block);
+    add_tile::<3, PAIRS>([8, 0], &pairs, block);
+    add_tile::<2, PAIRS>([12, 0], &pairs, block);
+    add_tile::<2, PAIRS>([12, 2], &pairs, block);
+    add_tile::<3, PAIRS>([16, 0], &pairs, block);
+    add_tile::<2, PAIRS>([16, 3], &pairs, block);
 }
 
-/// The first `WIDTH` entries of the rows `a` and `a + 1`.
+/// `VECTORS` vectors of each of four rows, from the row and the vector `at`: three of them, what they are multiplied by and one factor are what registers hold.
 #[inline(always)]
-fn add_two_rows<const WIDTH: usize, const PAIRS: usize>(a: usize, pairs: &[Pair; PAIRS], block: &mut NodePairs) {
-    let (mut first, mut second) = ([0.0; WIDTH], [0.0; WIDTH]);
-    first.copy_from_slice(&block[a][..WIDTH]);
-    second.copy_from_slice(&block[a + 1][..WIDTH]);
+fn add_tile<const VECTORS: usize, const PAIRS: usize>(
+    [row, vector]: [usize; 2],
+    pairs: &[Pair; PAIRS],
+    block: &mut NodePairs,
+) {
+    let mut sum = [[[0.0; LANES]; VECTORS]; LANES];
+    for r in 0..LANES {
+        sum[r].copy_from_slice(&block[row + r].as_chunks::<LANES>().0[vector..][..VECTORS]);
+    }
     for (left, right) in pairs {
         for (left, right) in left.iter().zip(*right) {
-            let (one, other) = (left[a], left[a + 1]);
-            for b in 0..WIDTH {
-                first[b] = one.mul_add(right[b], first[b]);
-            }
-            for b in 0..WIDTH {
-                second[b] = other.mul_add(right[b], second[b]);
+            let right = &right.as_chunks::<LANES>().0[vector..][..VECTORS];
+            for r in 0..LANES {
+                for v in 0..VECTORS {
+                    for lane in 0..LANES {
+                        sum[r][v][lane] = left[row + r].mul_add(right[v][lane], sum[r][v][lane]);
+                    }
+                }
             }
         }
     }
-    block[a][..WIDTH].copy_from_slice(&first);
-    block[a + 1][..WIDTH].copy_from_slice(&second);
+    for r in 0..LANES {
+        block[row + r].as_chunks_mut::<LANES>().0[vector..][..VECTORS].copy_from_slice(&sum[r]);
+    }
 }

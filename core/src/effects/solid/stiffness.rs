@@ -4,8 +4,8 @@
 
 use nalgebra::Matrix4;
 
-use super::SolidGeometry;
 use super::products::{add_products, add_symmetric_products, scaled_row};
+use super::{LANES, SolidGeometry};
 use crate::effect::LOWER_BLOCKS;
 use crate::mesh::element::{MODES, NODES, POINTS};
 
@@ -106,22 +106,35 @@ impl SolidGeometry {
             }
         }
         let core = self.mode_inverse[element] * core * self.mode_inverse[element];
+        let mut scales = [[0.0; MODES]; POINTS];
+        for (q, weight) in self.weights(element).iter().enumerate() {
+            for m in 0..MODES {
+                scales[q][m] = weight * self.mode_values[q][m];
+            }
+        }
         let (mut integrals, mut scaled) = ([[[0.0; NODES]; MODES]; 3], [[[0.0; NODES]; MODES]; 3]);
         for k in 0..3 {
-            for (q, weight) in self.weights(element).iter().enumerate() {
-                let gradient = &volumetric.dilatation_gradient[k][q];
-                for m in 0..MODES {
-                    let scale = weight * self.mode_values[q][m];
-                    for a in 0..NODES {
-                        integrals[k][m][a] = scale.mul_add(gradient[a], integrals[k][m][a]);
+            for chunk in 0..NODES / LANES {
+                let mut sum = [[0.0; LANES]; MODES];
+                for q in 0..POINTS {
+                    let gradient = &volumetric.dilatation_gradient[k][q].as_chunks::<LANES>().0[chunk];
+                    for m in 0..MODES {
+                        for lane in 0..LANES {
+                            sum[m][lane] = scales[q][m].mul_add(gradient[lane], sum[m][lane]);
+                        }
                     }
                 }
-            }
-            for m in 0..MODES {
-                for l in 0..MODES {
-                    for a in 0..NODES {
-                        scaled[k][m][a] = core[(m, l)].mul_add(integrals[k][l][a], scaled[k][m][a]);
+                let mut product = [[0.0; LANES]; MODES];
+                for m in 0..MODES {
+                    for l in 0..MODES {
+                        for lane in 0..LANES {
+                            product[m][lane] = core[(m, l)].mul_add(sum[l][lane], product[m][lane]);
+                        }
                     }
+                }
+                for m in 0..MODES {
+                    integrals[k][m].as_chunks_mut::<LANES>().0[chunk] = sum[m];
+                    scaled[k][m].as_chunks_mut::<LANES>().0[chunk] = product[m];
                 }
             }
         }
