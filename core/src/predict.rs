@@ -21,6 +21,7 @@ pub mod linear;
 pub mod networks;
 pub(crate) mod over_fluid;
 mod question;
+mod refinement;
 pub mod sampled;
 pub(crate) mod topologies;
 pub mod types;

@@ -2,7 +2,7 @@
 //!
 //! In each bin (kind of tip, mean strain) the worst node's error over the linear depth is ranked. The samples of a path resemble each other, so a bin of samples from p
 //! paths counts as p: its 95 % bound is the quantile at ⌈0.95 (p + 1)⌉ / p, which a sample of a new path stays below with at least that probability (split
-//! conformal prediction), and it has none where p is too small for that. Errors are those against the truth of the samples plus that truth's own.
+//! conformal prediction), and it has none where p is too small for that. Errors are those against the truth of the samples; that truth's own is counted by the core.
 //!
 //! Not here: which bins there are (`retina_core::predict::expected_error`), whether the bounds hold on other samples (`evaluate`).
 
@@ -29,14 +29,14 @@ pub fn strain(sample: &Sample) -> f64 {
     f64::from(sample.linear_depth_mm) / f64::from(retina + choroid)
 }
 
-/// Largest distance of a node to the truth, with the truth's own estimated error (µm); `None` where the level has no answer or no table.
+/// Largest distance of a node to the truth (µm); `None` where the level has no answer or no table.
 pub fn worst_um(sample: &Sample, level: Level) -> Option<f64> {
     let answer = match level {
         Level::Linear => &sample.linear,
         Level::Coarse => sample.coarse.as_ref()?,
         Level::Network | Level::Corrected | Level::Reference => return None,
     };
-    Some(distance_um(&answer.displacement_mm, &sample.truth.displacement_mm) + 1e3 * f64::from(sample.truth_error_mm))
+    Some(distance_um(&answer.displacement_mm, &sample.truth.displacement_mm))
 }
 
 /// A bin's quantiles from the error over the depth of each sample, with the path that it belongs to.
@@ -92,7 +92,8 @@ fn ratios(samples: &[&Sample], level: Level, tip: usize, at: usize) -> Vec<(u32,
         .collect()
 }
 
-fn entry(Quantiles { median, p95, samples }: &Quantiles) -> String {
+/// A bin's quantiles as they stand in the core.
+pub fn entry(Quantiles { median, p95, samples }: &Quantiles) -> String {
     let p95 = if p95.is_finite() { format!("{p95:.5}") } else { "f64::INFINITY".to_owned() };
     format!("of({median:.5}, {p95}, {samples})")
 }

@@ -12,6 +12,7 @@ pub mod describe;
 pub mod evaluate;
 pub mod faithful;
 pub mod parity;
+pub mod reference_error;
 pub mod sample;
 pub mod shard;
 pub mod train;

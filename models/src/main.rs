@@ -33,6 +33,8 @@ enum Command {
     Runtime(commands::runtime::Arguments),
     /// Measures how far the truth of the samples is from that on a finer mesh, on random paths.
     TruthError(commands::truth_error::Arguments),
+    /// Measures what refining the mesh of level `reference` still changes, on random requests, and writes it into the core.
+    ReferenceError(commands::reference_error::Arguments),
     /// Writes a data set in the layout that the public DeformContact code reads.
     ExportDeformcontact(commands::deformcontact::ExportArguments),
     /// Reads that layout back and says what is there.
@@ -50,6 +52,7 @@ fn main() -> ExitCode {
         Command::DatasetReport(arguments) => commands::dataset::run_report(&arguments),
         Command::Runtime(arguments) => commands::runtime::run(&arguments),
         Command::TruthError(arguments) => commands::truth_error::run(&arguments),
+        Command::ReferenceError(arguments) => commands::reference_error::run(&arguments),
         Command::ExportDeformcontact(arguments) => commands::deformcontact::run_export(&arguments),
         Command::ImportDeformcontact(arguments) => commands::deformcontact::run_import(&arguments),
     };

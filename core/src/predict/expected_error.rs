@@ -1,12 +1,14 @@
-//! How far a level's answer is likely to be from `reference`, before it is computed.
+//! How far a level's answer is likely to be from the converged one, before it is computed.
 //!
 //! The error is that of the worst of the patch's nodes (µm). It is read from quantiles measured once (`calibration.rs`, written by
 //! `retina-models calibrate` from a data set) in bins of what the linear answer knows: the kind of tip and the mean strain. In a bin the error scales with the
-//! depth, so the quantiles are of error over depth. The 95 % bound of n samples is their ⌈0.95 (n + 1)⌉-th smallest, which a new sample of the same
+//! depth, so the quantiles are of error over depth. What they were measured against is no finer than level `reference`, whose own error is what refinement still changes
+//! (`refinement.rs`, written by `retina-models reference-error`); the two have different causes and are added as independent ones, by their squares. The 95 % bound of n samples is their ⌈0.95 (n + 1)⌉-th smallest, which a new sample of the same
 //! kind stays below with at least that probability, whatever the distribution (split conformal prediction: Vovk et al.,
 //! *Algorithmic Learning in a Random World*, 2005). Outside of what was sampled the numbers are still given, and called uncalibrated.
 
 use super::calibration::{COARSE, LINEAR};
+use super::refinement::REFERENCE;
 use super::sampled;
 use super::types::Level;
 use crate::needle::{NeedleShape, Tip};
@@ -19,12 +21,10 @@ pub const BINS: usize = STRAIN_BINS.len() + 1;
 /// Kinds of tip, see [`Tip::kind`].
 pub const TIPS: usize = Tip::KINDS;
 
-/// What refinement may still change at level `reference`: this much (µm) or [`REFERENCE_SHARE`] of the depth, whichever is more.
+/// The unit of what refinement changes at level `reference`: this much (µm) or [`REFERENCE_SHARE`] of the depth, whichever is more.
 pub const REFERENCE_ERROR_UM: f64 = 0.5;
 /// See [`REFERENCE_ERROR_UM`]; both are what the `refinement` program holds every scene and gauge against.
 pub const REFERENCE_SHARE: f64 = 0.01;
-/// Median of what refinement changed over that bound (nine scenes and gauges, `refinement`): 0.10 to 0.39.
-const REFERENCE_MEDIAN_SHARE: f64 = 0.22;
 
 /// Quantiles of the worst node's error over the linear depth, in one bin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,19 +74,25 @@ impl ExpectedError {
     pub const UNKNOWN: Self = ExpectedError { median_um: f64::INFINITY, p95_um: f64::INFINITY, calibrated: false };
 }
 
-/// Measured quantiles of `level`, where it has a table, under a kind of tip at a mean strain.
+/// Measured quantiles of `level`, where it has a table, under a kind of tip at a mean strain: of the error over the depth, and at level `reference` over
+/// [`refinement_unit_um`].
 pub fn quantiles(level: Level, tip: usize, strain: f64) -> Option<&'static Quantiles> {
-    let table = match level {
-        Level::Linear => &LINEAR,
-        Level::Coarse => &COARSE,
-        Level::Network | Level::Corrected | Level::Reference => return None,
-    };
-    Some(&table[tip][bin(strain)])
+    match level {
+        Level::Linear => Some(&LINEAR[tip][bin(strain)]),
+        Level::Coarse => Some(&COARSE[tip][bin(strain)]),
+        Level::Reference => Some(&REFERENCE[tip]),
+        Level::Network | Level::Corrected => None,
+    }
 }
 
 /// The bin of a mean strain.
 pub fn bin(strain: f64) -> usize {
     STRAIN_BINS.iter().filter(|&&end| strain >= end).count()
+}
+
+/// The unit (µm) in which what refinement changes at level `reference` is counted, at a depth of the linear answer (µm).
+pub fn refinement_unit_um(depth_um: f64) -> f64 {
+    REFERENCE_ERROR_UM.max(REFERENCE_SHARE * depth_um)
 }
 
 impl Situation {
@@ -114,23 +120,16 @@ impl Situation {
             // Nothing moves, exactly.
             return ExpectedError { median_um: 0.0, p95_um: 0.0, calibrated: true };
         }
-        let quantiles = match level {
-            Level::Network => return self.network.unwrap_or(ExpectedError::UNKNOWN),
-            Level::Corrected => return self.corrected.unwrap_or(ExpectedError::UNKNOWN),
-            Level::Linear | Level::Coarse | Level::Reference => quantiles(level, self.tip, self.strain),
+        let unit_um = if level == Level::Reference { refinement_unit_um(self.depth_um) } else { self.depth_um };
+        let Some(quantiles) = quantiles(level, self.tip, self.strain) else {
+            let own = if level == Level::Network { self.network } else { self.corrected };
+            return own.unwrap_or(ExpectedError::UNKNOWN);
         };
-        let Some(quantiles) = quantiles else {
-            let bound = REFERENCE_ERROR_UM.max(REFERENCE_SHARE * self.depth_um);
-            return ExpectedError {
-                median_um: REFERENCE_MEDIAN_SHARE * bound,
-                p95_um: bound,
-                calibrated: self.sampled,
-            };
-        };
-        let (median_um, p95_um) = (quantiles.median * self.depth_um, quantiles.p95 * self.depth_um);
+        let (median_um, p95_um) = (quantiles.median * unit_um, quantiles.p95 * unit_um);
         let calibrated = self.sampled && quantiles.p95.is_finite();
         match level {
             Level::Linear => self.with_rigid_needle(median_um, p95_um, calibrated),
+            Level::Reference => ExpectedError { median_um, p95_um, calibrated },
             _ => self.with_reference_error(median_um, p95_um, calibrated),
         }
     }
@@ -141,10 +140,10 @@ impl Situation {
         self.with_reference_error(median_um + left_out_um, p95_um + left_out_um, calibrated && left_out_um == 0.0)
     }
 
-    /// An error against level `reference` as one against the truth: what was compared with has an error itself.
+    /// An error against an answer as fine as that of level `reference` as one against the converged answer.
     pub fn with_reference_error(&self, median_um: f64, p95_um: f64, calibrated: bool) -> ExpectedError {
         let own = self.expected_error(Level::Reference);
-        ExpectedError { median_um: median_um.hypot(own.median_um), p95_um: p95_um + own.p95_um, calibrated }
+        ExpectedError { median_um: median_um.hypot(own.median_um), p95_um: p95_um.hypot(own.p95_um), calibrated }
     }
 
     /// Whether `level` has an answer here, as far as that is known.

@@ -87,6 +87,19 @@ pub const REFERENCE: Resolution = Resolution {
 };
 
 impl Resolution {
+    /// Every edge of the mesh divided `factor` times as finely.
+    pub fn refined(&self, factor: f64) -> Resolution {
+        let finer = |count: usize| (count as f64 * factor).round() as usize;
+        Resolution {
+            core_cells: finer(self.core_cells),
+            rings: finer(self.rings),
+            retina_elements: finer(self.retina_elements),
+            choroid_elements: finer(self.choroid_elements),
+            sclera_elements: finer(self.sclera_elements),
+            ..*self
+        }
+    }
+
     /// As fine as a detached disc needs: half as many rings again, for half of them end at its edge and the others begin there.
     pub fn over_fluid(&self) -> Resolution {
         Resolution { rings: self.rings + self.rings / 2, ..*self }

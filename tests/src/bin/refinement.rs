@@ -8,7 +8,7 @@ use std::time::Instant;
 use nalgebra::{Point3, Unit, Vector3};
 use retina_core::comparison::node_errors_um;
 use retina_core::needle::{Gauge, Needle, NeedleShape};
-use retina_core::predict::finite_element::{REFERENCE, Resolution};
+use retina_core::predict::finite_element::REFERENCE;
 use retina_core::predict::{Control, EffectChoice, Level, PredictError, PreparedScene, Request, Workspace};
 use retina_core::progress::Silent;
 use retina_core::scene::Scene;
@@ -22,21 +22,9 @@ const DIRECTION: [f64; 3] = [0.30, 0.18, -0.94];
 /// Change that is accepted: absolute (µm) and relative to the largest displacement.
 const ACCEPTED: (f64, f64) = (0.5, 0.01);
 
-fn refined(factor: f64) -> Resolution {
-    let finer = |count: usize| (count as f64 * factor).round() as usize;
-    Resolution {
-        core_cells: finer(REFERENCE.core_cells),
-        rings: finer(REFERENCE.rings),
-        retina_elements: finer(REFERENCE.retina_elements),
-        choroid_elements: finer(REFERENCE.choroid_elements),
-        sclera_elements: finer(REFERENCE.sclera_elements),
-        ..REFERENCE
-    }
-}
-
 fn main() -> Result<(), PredictError> {
     let factor = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(1.5);
-    let finer = refined(factor);
+    let finer = REFERENCE.refined(factor);
     println!(
         "| scene | gauge | force mN | largest displacement µm | reference s | refined s | largest change µm | accepted µm | |"
     );
