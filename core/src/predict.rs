@@ -2,7 +2,7 @@
 //!
 //! [`PreparedScene`] holds what depends on the scene alone; [`Workspace`] is a thread's memory. Read on in `types` (what goes in and comes
 //! out), `question` (a request in the patch's frame), `answer` (level by level), `linear` (the layered answer, start of all others),
-//! `finite_element` (the levels on meshes), `held` (the interface), `over_fluid` (a bleb), `networks` and `learned` (the learned levels), `choice` (effects), `budget`, `expected_error` and `sampled` (levels),
+//! `finite_element` and `resolution` (the levels on meshes), `held` (the interface), `over_fluid` (a bleb), `networks` and `learned` (the learned levels), `choice` (effects), `budget`, `expected_error` and `sampled` (levels),
 //! `indentation` (many steps of one needle). Not here: HTTP, clocks, threads.
 
 pub(crate) mod answer;
@@ -22,6 +22,7 @@ pub mod networks;
 pub(crate) mod over_fluid;
 mod question;
 mod refinement;
+mod resolution;
 pub mod sampled;
 pub(crate) mod topologies;
 pub mod types;

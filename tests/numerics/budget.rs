@@ -89,6 +89,27 @@ fn a_level_without_an_answer_is_not_chosen() {
 }
 
 #[test]
+fn no_level_is_surer_than_reference_and_reference_is_less_sure_under_edges() {
+    let scene = Scene::built_in("macula").unwrap();
+    let shapes = [NeedleShape::hemispherical(0.257), NeedleShape::flat(0.257), NeedleShape::bevelled(0.257)];
+    for depth_um in [3.0, 60.0, 250.0] {
+        let own = shapes.map(|shape| {
+            let situation = Situation::new(&scene, &shape, 20.0, 1e-3 * depth_um, 0.15);
+            let own = situation.expected_error(Level::Reference);
+            for level in [Level::Linear, Level::Coarse] {
+                let error = situation.expected_error(level);
+                assert!(
+                    error.p95_um > own.p95_um && error.median_um > own.median_um,
+                    "{level:?}, {shape:?}: {error:?}"
+                );
+            }
+            own.p95_um
+        });
+        assert!(own[1] > 2.0 * own[0] && own[2] > 2.0 * own[0], "{own:?} µm at {depth_um} µm");
+    }
+}
+
+#[test]
 fn outside_of_what_was_measured_nothing_is_called_calibrated() {
     let scene = Scene::built_in("macula").unwrap();
     let situation = |shape: &NeedleShape, angle| Situation::new(&scene, shape, angle, 0.06, 0.15);
