@@ -9,6 +9,7 @@ pub mod comparison;
 pub mod effect;
 pub mod effects;
 pub mod equilibrium;
+pub mod kernel;
 pub mod layered;
 pub mod mesh;
 pub mod needle;

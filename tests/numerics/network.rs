@@ -348,6 +348,12 @@ fn a_product_with_packed_weights_is_the_product() {
             assert!((out - before - plain).abs() < SINGLE, "{rows} × {inner} × {columns}: {out} {before} {plain}");
         }
         assert_ne!(out, before);
+        let by_columns: Vec<f32> = (0..columns * inner).map(|at| w[at % inner * columns + at / inner]).collect();
+        let mut packed = Packed::new(&x, inner);
+        packed.pack_transposed(&by_columns, columns);
+        assert_eq!(packed, Packed::new(&w, columns));
+        packed.product(&mut out, &x);
+        assert!(out.iter().zip(&plain).all(|(out, plain)| (out - plain).abs() < SINGLE));
     }
 }
 

@@ -7,10 +7,9 @@
 use nalgebra::Matrix3;
 
 use super::finite_strain::Lame;
-use super::solid::{
-    Energy, Gradient, Hessian, SolidEnergy, SolidGeometry, StiffnessCoefficients, Volumetric, run_kernel,
-};
+use super::solid::{Energy, Gradient, Hessian, SolidEnergy, SolidGeometry, StiffnessCoefficients, Volumetric};
 use crate::effect::{Effect, Local};
+use crate::kernel::run_kernel;
 use crate::mesh::element::{NODES, POINTS};
 
 /// Name of the effect.

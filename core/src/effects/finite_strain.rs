@@ -14,10 +14,11 @@
 use nalgebra::Matrix3;
 
 use super::solid::{
-    ElementKernel, Energy, Gradient, Hessian, MaxStep, PointRows, SolidEnergy, SolidGeometry, StiffnessCoefficients,
-    Volumetric, determinant_and_cofactor, push_forward, run_kernel,
+    Energy, Gradient, Hessian, MaxStep, PointRows, SolidEnergy, SolidGeometry, StiffnessCoefficients, Volumetric,
+    determinant_and_cofactor, push_forward,
 };
 use crate::effect::{Effect, Local};
+use crate::kernel::{Kernel, run_kernel};
 use crate::mesh::element::{NODES, POINTS};
 
 /// Name of the effect.
@@ -153,7 +154,7 @@ impl FiniteStrain<'_> {
 
 struct PredictStress<'a>(&'a FiniteStrain<'a>, &'a Local<'a>, &'a [f64], &'a mut [f64]);
 
-impl ElementKernel for PredictStress<'_> {
+impl Kernel for PredictStress<'_> {
     type Output = ();
 
     #[inline(always)]

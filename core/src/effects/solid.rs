@@ -14,6 +14,7 @@ use nalgebra::{Matrix3, Matrix4, Vector4};
 use thiserror::Error;
 
 use crate::effect::{Local, Stencils};
+use crate::kernel::Kernel;
 use crate::mesh::element::{MODES, NODES, POINTS, QUADRATURE};
 pub use stiffness::{PointRows, StiffnessCoefficients, Volumetric};
 
@@ -250,26 +251,6 @@ pub(super) fn push_forward(matrix: &Matrix3<f64>, gradients: &NodeRows, point: u
     }
 }
 
-/// A computation on one element. A trait and not a closure: a closure that is not inlined loses the vector instructions.
-pub(super) trait ElementKernel {
-    /// What it returns.
-    type Output;
-
-    /// Runs it. Implementations and all that they call are `#[inline(always)]`.
-    fn run(self) -> Self::Output;
-}
-
-struct Dispatched<K>(K);
-
-impl<K: ElementKernel> pulp::WithSimd for Dispatched<K> {
-    type Output = K::Output;
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _simd: S) -> K::Output {
-        self.0.run()
-    }
-}
-
 /// What a solid effect computes on one element; implementations are `#[inline(always)]`.
 pub(super) trait SolidEnergy {
     /// Energy (µJ).
@@ -283,7 +264,7 @@ pub(super) trait SolidEnergy {
 /// The kernel of [`SolidEnergy::energy_n`].
 pub(super) struct Energy<'a, S>(pub &'a S, pub &'a Local<'a>);
 
-impl<S: SolidEnergy> ElementKernel for Energy<'_, S> {
+impl<S: SolidEnergy> Kernel for Energy<'_, S> {
     type Output = f64;
 
     #[inline(always)]
@@ -295,7 +276,7 @@ impl<S: SolidEnergy> ElementKernel for Energy<'_, S> {
 /// The kernel of [`SolidEnergy::add_gradient_n`].
 pub(super) struct Gradient<'a, S>(pub &'a S, pub &'a Local<'a>, pub &'a mut [f64]);
 
-impl<S: SolidEnergy> ElementKernel for Gradient<'_, S> {
+impl<S: SolidEnergy> Kernel for Gradient<'_, S> {
     type Output = ();
 
     #[inline(always)]
@@ -307,7 +288,7 @@ impl<S: SolidEnergy> ElementKernel for Gradient<'_, S> {
 /// The kernel of [`SolidEnergy::add_hessian_n`].
 pub(super) struct Hessian<'a, S>(pub &'a S, pub &'a Local<'a>, pub &'a mut [f64]);
 
-impl<S: SolidEnergy> ElementKernel for Hessian<'_, S> {
+impl<S: SolidEnergy> Kernel for Hessian<'_, S> {
     type Output = ();
 
     #[inline(always)]
@@ -319,16 +300,11 @@ impl<S: SolidEnergy> ElementKernel for Hessian<'_, S> {
 /// The kernel of [`SolidGeometry::max_step`].
 pub(super) struct MaxStep<'a>(pub &'a SolidGeometry, pub &'a Local<'a>, pub &'a [f64]);
 
-impl ElementKernel for MaxStep<'_> {
+impl Kernel for MaxStep<'_> {
     type Output = f64;
 
     #[inline(always)]
     fn run(self) -> f64 {
         self.0.max_step(self.1, self.2)
     }
-}
-
-/// Runs `kernel` under the machine's widest vector instructions.
-pub(super) fn run_kernel<K: ElementKernel>(kernel: K) -> K::Output {
-    pulp::Arch::new().dispatch(Dispatched(kernel))
 }

@@ -19,9 +19,10 @@ use nalgebra::Matrix3;
 use super::solid::products::add_products;
 use super::solid::{
     Energy, Gradient, Hessian, MaxStep, SolidEnergy, SolidGeometry, StiffnessCoefficients, determinant_and_cofactor,
-    push_forward, run_kernel,
+    push_forward,
 };
 use crate::effect::{Effect, Local, Stencils, add_isotropic};
+use crate::kernel::run_kernel;
 use crate::mesh::element::{NODES, POINTS};
 
 /// Name of the effect.

@@ -27,7 +27,7 @@ use super::softmax::softmax;
 use super::weights::{Weights, WeightsError};
 use crate::patch::NODE_COUNT;
 use features::{RIGID, SOFT};
-use tag::{HOPS, Propagation, TagConv};
+use tag::{HOPS, Propagation, Strips, TagConv};
 use tool::TOOL_NODES;
 
 /// Width of the encoders and of the decoder.
@@ -52,17 +52,19 @@ pub struct FaithfulNetwork {
     rigid: [TagConv; 2],
     /// `W Wᵀ / √256` of each head: query times key in one matrix.
     heads: [Vec<f32>; HEADS],
+    /// The decoder's first layer: the patch's rows with the bias, then those of each head.
+    first: Dense,
+    joined: [Packed; HEADS],
+    /// Its other layers.
     decoder: Vec<Dense>,
-    /// The patch's rows of the decoder's first layer; that layer above has the heads' rows.
-    first: Packed,
     tool: Propagation,
 }
 
 /// What depends on the patch alone: it is computed once and kept.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EncodedPatch {
-    /// `S Wₕ Wₕᵀ / √256` of each head, 64 × 256.
-    queries: [Vec<f32>; HEADS],
+    /// `S Wₕ Wₕᵀ / √256`, 64 × 256, of one head after the other.
+    queries: Vec<f32>,
     /// S times its rows of the decoder's first layer, and that layer's bias, 64 × 256.
     first: Vec<f32>,
 }
@@ -70,12 +72,15 @@ pub struct EncodedPatch {
 /// Memory that one thread keeps between predictions.
 #[derive(Default)]
 pub struct Memory {
+    strips: Strips,
     hops: Vec<f32>,
     layer: Vec<f32>,
     rigid: Vec<f32>,
+    keys: Packed,
+    values: Packed,
     scores: Vec<f32>,
-    value: Vec<f32>,
-    joined: Vec<f32>,
+    attended: Vec<f32>,
+    decoded: Vec<f32>,
     next: Vec<f32>,
 }
 
@@ -102,20 +107,20 @@ impl FaithfulNetwork {
             folded.iter_mut().for_each(|x| *x /= (WIDTH as f32).sqrt());
             Ok(folded)
         };
-        let decoder = |at: usize| weights.take(&format!("decoder.{at}.weight"), &DECODER[at]);
-        let dense = |(at, [_, outer]): (usize, [usize; 2])| -> Result<Dense, WeightsError> {
-            let patch = if at == 0 { WIDTH * outer } else { 0 };
-            Ok(Dense {
-                weight: Packed::new(&decoder(at)?[patch..], outer),
-                bias: weights.take(&format!("decoder.{at}.bias"), &[outer])?,
-            })
+        let weight = |at: usize| weights.take(&format!("decoder.{at}.weight"), &DECODER[at]);
+        let bias = |at: usize| weights.take(&format!("decoder.{at}.bias"), &DECODER[at][1..]);
+        let dense = |at: usize| -> Result<Dense, WeightsError> {
+            Ok(Dense { weight: Packed::new(&weight(at)?, DECODER[at][1]), bias: bias(at)? })
         };
+        let first = weight(0)?;
+        let body = |at: usize| Packed::new(&first[at * WIDTH * WIDTH..][..WIDTH * WIDTH], WIDTH);
         Ok(FaithfulNetwork {
             soft: encoder("soft", SOFT)?,
             rigid: encoder("rigid", RIGID)?,
             heads: [head(0)?, head(1)?],
-            decoder: DECODER.into_iter().enumerate().map(dense).collect::<Result<_, _>>()?,
-            first: Packed::new(&decoder(0)?[..WIDTH * DECODER[0][1]], DECODER[0][1]),
+            first: Dense { weight: body(0), bias: bias(0)? },
+            joined: [body(1), body(2)],
+            decoder: (1..DECODER.len()).map(dense).collect::<Result<_, _>>()?,
             tool: Propagation::new(TOOL_NODES, &tool::edges()),
         })
     }
@@ -136,14 +141,13 @@ impl FaithfulNetwork {
         let (mut features, mut soft) = (Vec::new(), Vec::new());
         features::soft(rest, &mut features);
         encode((&self.soft, "soft"), mesh, &features, memory, &mut soft, seen);
-        let queries = [0, 1].map(|head: usize| {
-            let mut query = vec![0.0; soft.len()];
-            product(&mut query, &soft, &self.heads[head], WIDTH, WIDTH, Into::Place);
-            query
-        });
+        let mut queries = vec![0.0; HEADS * soft.len()];
+        for (queries, head) in queries.chunks_exact_mut(soft.len()).zip(&self.heads) {
+            product(queries, &soft, head, WIDTH, WIDTH, Into::Place);
+        }
         let mut first = vec![0.0; soft.len()];
-        fill_rows(&mut first, &self.decoder[0].bias);
-        self.first.add_product(&mut first, &soft);
+        fill_rows(&mut first, &self.first.bias);
+        self.first.weight.add_product(&mut first, &soft);
         EncodedPatch { queries, first }
     }
 
@@ -156,36 +160,32 @@ impl FaithfulNetwork {
     pub fn predict_observed(&self, patch: &EncodedPatch, tool: &[f32], memory: &mut Memory, seen: Observer) -> Field {
         let mut rigid = std::mem::take(&mut memory.rigid);
         encode((&self.rigid, "rigid"), &self.tool, tool, memory, &mut rigid, seen);
-        let Memory { scores, value, joined, next, .. } = memory;
-        scores.resize(NODE_COUNT * TOOL_NODES, 0.0);
-        value.resize(NODE_COUNT * WIDTH, 0.0);
-        joined.resize(NODE_COUNT * WIDTH * HEADS, 0.0);
-        for (at, query) in patch.queries.iter().enumerate() {
-            product_transposed(scores, query, &rigid, TOOL_NODES, WIDTH);
-            softmax(scores, TOOL_NODES);
-            product(value, scores, &rigid, TOOL_NODES, WIDTH, Into::Place);
-            seen("head", at, value);
-            for (row, value) in joined.chunks_exact_mut(WIDTH * HEADS).zip(value.chunks_exact(WIDTH)) {
-                row[WIDTH * at..][..WIDTH].copy_from_slice(value);
-            }
-        }
+        let Memory { keys, values, scores, attended, decoded, next, .. } = memory;
+        keys.pack_transposed(&rigid, TOOL_NODES);
+        values.pack(&rigid, WIDTH);
         memory.rigid = rigid;
-        for (at, (dense, [_, outer])) in self.decoder.iter().zip(DECODER).enumerate() {
-            next.resize(NODE_COUNT * outer, 0.0);
-            if at == 0 {
-                // The patch's part of the sum is known; what is left are the heads' rows.
-                next.copy_from_slice(&patch.first);
-            } else {
-                fill_rows(next, &dense.bias);
-            }
-            dense.weight.add_product(next, joined);
+        keys.product(scores, &patch.queries);
+        softmax(scores, TOOL_NODES);
+        values.product(attended, scores);
+        // The patch's part of the first layer is known; what is left are the heads' rows.
+        decoded.clone_from(&patch.first);
+        for (at, (attended, joined)) in attended.chunks_exact(NODE_COUNT * WIDTH).zip(&self.joined).enumerate() {
+            seen("head", at, attended);
+            joined.add_product(decoded, attended);
+        }
+        relu(decoded);
+        seen("decoder", 0, decoded);
+        for (at, dense) in (1..).zip(&self.decoder) {
+            next.resize(NODE_COUNT * dense.bias.len(), 0.0);
+            fill_rows(next, &dense.bias);
+            dense.weight.add_product(next, decoded);
             if at + 1 < DECODER.len() {
                 relu(next);
             }
             seen("decoder", at, next);
-            std::mem::swap(joined, next);
+            std::mem::swap(decoded, next);
         }
-        let rows = joined.as_chunks::<3>().0;
+        let rows = decoded.as_chunks::<3>().0;
         std::array::from_fn(|node| Vector3::from(rows[node]) * UNIT_MM)
     }
 }
@@ -199,11 +199,11 @@ fn encode(
     out: &mut Vec<f32>,
     seen: Observer,
 ) {
-    let Memory { hops, layer, .. } = memory;
-    layers[0].forward(mesh, features, hops, layer);
+    let Memory { strips, hops, layer, .. } = memory;
+    layers[0].forward(mesh, features, strips, hops, layer);
     relu(layer);
     seen(body, 0, layer);
-    layers[1].forward(mesh, layer, hops, out);
+    layers[1].forward(mesh, layer, strips, hops, out);
     relu(out);
     seen(body, 1, out);
 }

@@ -14,7 +14,7 @@ const ROWS: usize = 6;
 const WIDEST: usize = 32;
 
 /// Weights of `inner × columns`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Packed {
     inner: usize,
     columns: usize,
@@ -27,21 +27,58 @@ pub struct Packed {
 impl Packed {
     /// Of weights that lie row by row, `columns` numbers each.
     pub fn new(weight: &[f32], columns: usize) -> Self {
-        let (width, inner) = (Arch::new().dispatch(Width), weight.len() / columns);
-        let mut panels = Vec::with_capacity(inner * columns.next_multiple_of(width));
-        for first in (0..columns).step_by(width) {
-            for row in weight.chunks_exact(columns) {
-                let used = &row[first..columns.min(first + width)];
-                panels.extend_from_slice(used);
-                panels.resize(panels.len() + width - used.len(), 0.0);
+        let mut packed = Packed::default();
+        packed.pack(weight, columns);
+        packed
+    }
+
+    /// Replaces them by others, that lie row by row, `columns` numbers each.
+    pub fn pack(&mut self, weight: &[f32], columns: usize) {
+        self.lay_out(weight.len() / columns, columns);
+        for (first, panel) in
+            (0..columns).step_by(self.width).zip(self.panels.chunks_exact_mut(self.inner * self.width))
+        {
+            let used = self.width.min(columns - first);
+            for (to, row) in panel.chunks_exact_mut(self.width).zip(weight.chunks_exact(columns)) {
+                to[..used].copy_from_slice(&row[first..][..used]);
             }
         }
-        Packed { inner, columns, width, panels }
+    }
+
+    /// Replaces them by others, that lie column by column; there are `columns` of them.
+    pub fn pack_transposed(&mut self, weight: &[f32], columns: usize) {
+        let inner = weight.len() / columns;
+        self.lay_out(inner, columns);
+        for (panel, weight) in self.panels.chunks_exact_mut(inner * self.width).zip(weight.chunks(inner * self.width)) {
+            for (column, weight) in weight.chunks_exact(inner).enumerate() {
+                for (to, x) in panel[column..].iter_mut().step_by(self.width).zip(weight) {
+                    *to = *x;
+                }
+            }
+        }
+    }
+
+    /// Makes room, zero where a panel is wider than its columns.
+    fn lay_out(&mut self, inner: usize, columns: usize) {
+        let width = Arch::new().dispatch(Width);
+        (self.inner, self.columns, self.width) = (inner, columns, width);
+        self.panels.clear();
+        self.panels.resize(inner * columns.next_multiple_of(width), 0.0);
     }
 
     /// Numbers that they hold.
     pub fn numbers(&self) -> usize {
         self.panels.len()
+    }
+
+    /// `out = x w`, row by row.
+    ///
+    /// # Panics
+    /// If the lengths do not fit together.
+    pub fn product(&self, out: &mut Vec<f32>, x: &[f32]) {
+        out.clear();
+        out.resize(x.len() / self.inner * self.columns, 0.0);
+        self.add_product(out, x);
     }
 
     /// `out += x w`, row by row. The number of rows is `x.len() / inner`.

@@ -6,7 +6,7 @@
 
 use std::f32::consts::LOG2_E;
 
-use pulp::Arch;
+use crate::kernel::{Kernel, run_kernel};
 
 /// Smallest exponent that has a weight; e⁻⁸⁷ is the smallest normal number.
 pub const LEAST: f32 = -80.0;
@@ -16,6 +16,8 @@ const WHOLE: f32 = 12_582_912.0;
 const LN_2_HIGH: f32 = 355.0 / 512.0;
 /// What is missing from it to ln 2.
 const LN_2_LOW: f32 = -2.121_944_4e-4;
+/// 1/7 to 1/1: the terms of the series, from the last to the first.
+const INVERSES: [f32; 7] = [1.0 / 7.0, 1.0 / 6.0, 1.0 / 5.0, 1.0 / 4.0, 1.0 / 3.0, 1.0 / 2.0, 1.0];
 /// Bits behind the point of an `f32`.
 const MANTISSA: u32 = 23;
 /// Numbers that are compared or added side by side.
@@ -29,24 +31,49 @@ pub fn exp_of_negative(x: f32) -> f32 {
     let n = shifted - WHOLE;
     let r = (bounded - n * LN_2_HIGH) - n * LN_2_LOW;
     let mut series = 1.0;
-    for term in (1..=7).rev() {
-        series = 1.0 + r * series * (1.0 / term as f32);
+    for inverse in INVERSES {
+        series = 1.0 + r * series * inverse;
     }
     let power = f32::from_bits((shifted.to_bits() << MANTISSA).wrapping_add(1.0_f32.to_bits()));
-    if x < LEAST { 0.0 } else { series * power }
+    // A choice between two numbers would be a jump, and jumps keep the loops from vector instructions.
+    let kept = u32::from(x < LEAST).wrapping_sub(1);
+    f32::from_bits((series * power).to_bits() & kept)
 }
 
 /// Every row of `columns` numbers becomes positive and adds up to one.
 pub fn softmax(rows: &mut [f32], columns: usize) {
-    // With the widest vectors of this processor.
-    Arch::new().dispatch(|| {
-        for row in rows.chunks_exact_mut(columns) {
-            let largest = folded(row, f32::NEG_INFINITY, |a, b| if b > a { b } else { a });
-            row.iter_mut().for_each(|x| *x = exp_of_negative(*x - largest));
-            let share = 1.0 / folded(row, 0.0, |a, b| a + b);
-            row.iter_mut().for_each(|x| *x *= share);
+    run_kernel(Softmax(rows, columns));
+}
+
+struct Softmax<'a>(&'a mut [f32], usize);
+
+impl Kernel for Softmax<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for row in self.0.chunks_exact_mut(self.1) {
+            let largest = folded(
+                row,
+                f32::NEG_INFINITY,
+                #[inline(always)]
+                |a, b| if b > a { b } else { a },
+            );
+            for x in row.iter_mut() {
+                *x = exp_of_negative(*x - largest);
+            }
+            let share = 1.0
+                / folded(
+                    row,
+                    0.0,
+                    #[inline(always)]
+                    |a, b| a + b,
+                );
+            for x in row.iter_mut() {
+                *x *= share;
+            }
         }
-    });
+    }
 }
 
 /// `fold` over all numbers of a row in eight strands, which are joined at the end.

@@ -1,6 +1,6 @@
 //! The encoders' graph convolutions, forward and backward: TAGConv as in the paper, and the two that it is compared with.
 
-use retina_core::network::faithful::tag::{HOPS, Propagation};
+use retina_core::network::faithful::tag::{HOPS, Propagation, Strips};
 use retina_core::network::faithful::{WIDTH, relu};
 
 use super::attention::{Attention, Gathered};
@@ -58,7 +58,7 @@ impl Convolution {
         let mut kept = Convolved::default();
         match self {
             Convolution::Tag(dense) => {
-                mesh.tag.hops(x, &mut kept.input);
+                mesh.tag.hops(x, &mut Strips::default(), &mut kept.input);
                 kept.out = dense.forward(parameters, &kept.input);
             }
             Convolution::Gcn(dense) => {
@@ -86,7 +86,7 @@ impl Convolution {
         match self {
             Convolution::Tag(dense) => {
                 let mut dhops = dense.backward(parameters, &kept.input, &kept.out, dout, gradient);
-                mesh.tag.gather(&mut dhops);
+                mesh.tag.gather(&mut Strips::default(), &mut dhops);
                 let inputs = dense.inner / (HOPS + 1);
                 dhops.chunks_exact(dense.inner).flat_map(|row| row[..inputs].to_vec()).collect()
             }

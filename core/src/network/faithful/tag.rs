@@ -2,15 +2,33 @@
 //!
 //! The hops are written side by side, so the sum is one product of `nodes × (K + 1) inputs` by `(K + 1) inputs × outputs`.
 
-use pulp::Arch;
+use std::ops::Range;
 
 use super::WIDTH;
+use crate::kernel::{Kernel, run_kernel};
 use crate::network::dense::fill_rows;
 use crate::network::packed::Packed;
 use crate::network::weights::{Weights, WeightsError};
 
 /// K: how far a node hears.
 pub const HOPS: usize = 3;
+
+/// Columns that are propagated at a time: those of all nodes stay in the nearest memory from hop to hop.
+const STRIP: usize = 32;
+
+/// Memory for two strips of columns, kept between propagations.
+#[derive(Clone, Debug, Default)]
+pub struct Strips([Vec<[f32; STRIP]>; 2]);
+
+impl Strips {
+    /// Calls `act` for each strip of `width` columns, with room for it and for its next hop.
+    fn each(&mut self, nodes: usize, width: usize, mut act: impl FnMut(Range<usize>, &mut [Vec<[f32; STRIP]>; 2])) {
+        self.0.iter_mut().for_each(|strip| strip.resize(nodes, [0.0; STRIP]));
+        for first in (0..width).step_by(STRIP) {
+            act(first..width.min(first + STRIP), &mut self.0);
+        }
+    }
+}
 
 /// `Â` of a mesh, row by row.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,44 +62,72 @@ impl Propagation {
         self.entries.len()
     }
 
-    /// Adds `Â x` to the numbers that stand at `to`: rows are `stride` apart, `width` numbers long, and those of x begin at `from` within them.
-    fn hop(&self, rows: &mut [f32], stride: usize, width: usize, from: usize, to: usize) {
-        let mut sum = [0.0; WIDTH];
-        let sum = &mut sum[..width];
-        // With the widest vectors of this processor.
-        Arch::new().dispatch(|| {
-            for node in 0..self.nodes() {
-                sum.copy_from_slice(&rows[node * stride + to..][..width]);
-                for &(other, weight) in &self.entries[self.starts[node]..self.starts[node + 1]] {
-                    let x = &rows[other * stride + from..][..width];
-                    sum.iter_mut().zip(x).for_each(|(sum, x)| *sum += weight * x);
+    /// `[x, Âx, Â²x, Â³x]` side by side.
+    pub fn hops(&self, x: &[f32], strips: &mut Strips, out: &mut Vec<f32>) {
+        let width = x.len() / self.nodes();
+        let stride = (HOPS + 1) * width;
+        out.resize(self.nodes() * stride, 0.0);
+        strips.each(self.nodes(), width, |strip, [near, far]| {
+            for (near, row) in near.iter_mut().zip(x.chunks_exact(width)) {
+                near[..strip.len()].copy_from_slice(&row[strip.clone()]);
+            }
+            for k in 0..=HOPS {
+                for (near, row) in near.iter().zip(out.chunks_exact_mut(stride)) {
+                    row[k * width..][strip.clone()].copy_from_slice(&near[..strip.len()]);
                 }
-                rows[node * stride + to..][..width].copy_from_slice(sum);
+                if k < HOPS {
+                    far.fill([0.0; STRIP]);
+                    run_kernel(AddHop { mesh: self, x: near, sums: far });
+                    std::mem::swap(near, far);
+                }
             }
         });
     }
 
-    /// `[x, Âx, Â²x, Â³x]` side by side.
-    pub fn hops(&self, x: &[f32], out: &mut Vec<f32>) {
-        let width = x.len() / self.nodes();
-        let stride = (HOPS + 1) * width;
-        out.resize(self.nodes() * stride, 0.0);
-        for (row, x) in out.chunks_exact_mut(stride).zip(x.chunks_exact(width)) {
-            row[..width].copy_from_slice(x);
-            row[width..].fill(0.0);
-        }
-        for k in 0..HOPS {
-            self.hop(out, stride, width, k * width, (k + 1) * width);
-        }
-    }
-
     /// The transposed of [`hops`](Self::hops): derivatives by the hops become derivatives by `x`, added to the first block of each row.
-    pub fn gather(&self, hops: &mut [f32]) {
+    pub fn gather(&self, strips: &mut Strips, hops: &mut [f32]) {
         let stride = hops.len() / self.nodes();
         let width = stride / (HOPS + 1);
-        for k in (0..HOPS).rev() {
-            // Â is symmetric.
-            self.hop(hops, stride, width, (k + 1) * width, k * width);
+        strips.each(self.nodes(), width, |strip, [near, far]| {
+            for k in (0..=HOPS).rev() {
+                for (near, row) in near.iter_mut().zip(hops.chunks_exact(stride)) {
+                    near[..strip.len()].copy_from_slice(&row[k * width..][strip.clone()]);
+                }
+                if k < HOPS {
+                    // Â is symmetric.
+                    run_kernel(AddHop { mesh: self, x: far, sums: near });
+                }
+                std::mem::swap(near, far);
+            }
+            for (sum, row) in far.iter().zip(hops.chunks_exact_mut(stride)) {
+                row[strip.clone()].copy_from_slice(&sum[..strip.len()]);
+            }
+        });
+    }
+}
+
+/// Adds `Â x` to `sums`.
+struct AddHop<'a> {
+    mesh: &'a Propagation,
+    x: &'a [[f32; STRIP]],
+    sums: &'a mut [[f32; STRIP]],
+}
+
+impl Kernel for AddHop<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Propagation { starts, entries } = self.mesh;
+        for (sums, ends) in self.sums.iter_mut().zip(starts.windows(2)) {
+            let mut sum = *sums;
+            for &(other, weight) in &entries[ends[0]..ends[1]] {
+                let x = &self.x[other];
+                for column in 0..STRIP {
+                    sum[column] += weight * x[column];
+                }
+            }
+            *sums = sum;
         }
     }
 }
@@ -104,9 +150,9 @@ impl TagConv {
         })
     }
 
-    /// `out = Σ Âᵏ x Wₖ + b`; `hops` is overwritten.
-    pub fn forward(&self, mesh: &Propagation, x: &[f32], hops: &mut Vec<f32>, out: &mut Vec<f32>) {
-        mesh.hops(x, hops);
+    /// `out = Σ Âᵏ x Wₖ + b`; `strips` and `hops` are overwritten.
+    pub fn forward(&self, mesh: &Propagation, x: &[f32], strips: &mut Strips, hops: &mut Vec<f32>, out: &mut Vec<f32>) {
+        mesh.hops(x, strips, hops);
         out.resize(mesh.nodes() * WIDTH, 0.0);
         fill_rows(out, &self.bias);
         self.weight.add_product(out, hops);
