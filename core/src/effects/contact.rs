@@ -8,7 +8,7 @@
 //!
 //! Law: the forces on tissue and needle are equal and opposite, along the needle's surface normal; no force acts beyond s.
 //! The penetration at pressure p is p/k: [`Contact::stiffness_kpa_per_mm`] is chosen where the mesh is known.
-//! Not here: friction, search for candidate faces beyond a bounding sphere.
+//! Not here: friction, search for candidate faces beyond a bound for each.
 
 mod face_rule;
 
@@ -77,6 +77,11 @@ impl ContactFaces {
         FaceStiffness::new(&self.rule)
     }
 }
+
+/// Corners of a face among its nodes.
+const CORNERS: [usize; 4] = [0, 2, 5, 7];
+/// Its edges, each with its middle node, in opposite pairs.
+const OPPOSITE_EDGES: [[[usize; 3]; 2]; 2] = [[[0, 1, 2], [5, 6, 7]], [[0, 3, 5], [2, 4, 7]]];
 
 /// The effect on a set of faces. The last vertex of each group is the needle's tip.
 pub struct Contact<'a> {
@@ -161,6 +166,21 @@ impl Contact<'_> {
         })
     }
 
+    /// A distance (mm) that no point of the face falls short of, from its nodes in needle coordinates: the needle's signed distance is convex, so it lies above its
+    /// tangent at the middle of the corners; along this a face reaches no further than its corners and the bulges of its edges.
+    fn nearest_bound_mm(&self, nodes: &[Vector3<f64>; FACE_NODES]) -> f64 {
+        let middle = CORNERS.map(|corner| nodes[corner]).iter().sum::<Vector3<f64>>() / CORNERS.len() as f64;
+        let tangent = self.shape.signed_distance(&Point3::from(middle));
+        let along = nodes.map(|node| tangent.gradient.dot(&(node - middle)));
+        let corner = CORNERS.map(|corner| along[corner]).into_iter().fold(f64::INFINITY, f64::min);
+        // Of two opposite edges the shape functions of the middle nodes add up to one at most.
+        let bulges = OPPOSITE_EDGES.map(|pair| {
+            let bulge = |[from, middle, to]: [usize; 3]| along[middle] - 0.5 * (along[from] + along[to]);
+            pair.map(bulge).into_iter().fold(0.0, f64::min)
+        });
+        tangent.value + corner + bulges.iter().sum::<f64>()
+    }
+
     /// Calls `visit(point, its area, its signed distance)` for each point of the face in contact.
     fn for_each_touching(&self, local: &Local, mut visit: impl FnMut(usize, f64, SignedDistance)) {
         let nodes = self.nodes_in_needle(local);
@@ -184,11 +204,7 @@ impl Effect for Contact<'_> {
     }
 
     fn is_active(&self, local: &Local) -> bool {
-        let nodes: [Vector3<f64>; FACE_NODES] = std::array::from_fn(|a| vertex(local, a));
-        let center = nodes.iter().sum::<Vector3<f64>>() / FACE_NODES as f64;
-        let radius = nodes.iter().map(|node| (node - center).norm_squared()).fold(0.0, f64::max).sqrt();
-        let at = Point3::from(self.frame_from_needle.inverse_transform_vector(&(center - self.tip(local))));
-        self.shape.distance(&at) < BOUNDING_MARGIN * radius + self.smoothing_mm
+        self.nearest_bound_mm(&self.nodes_in_needle(local)) < self.smoothing_mm
     }
 
     fn predicted_len(&self) -> usize {
@@ -242,6 +258,3 @@ impl Effect for Contact<'_> {
         stiffness.add_to(out);
     }
 }
-
-/// A quadratic face may bulge beyond the sphere through its nodes, and bevel corners overstate distance by up to √2.
-const BOUNDING_MARGIN: f64 = 2.0;
