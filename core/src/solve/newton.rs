@@ -221,6 +221,7 @@ impl System<'_> {
         let mut report = NewtonReport::default();
         let mut weakenings = 0;
         let mut chords_below_mn = CHORD_BELOW * settings.force_scale_mn;
+        workspace.factor.begin();
         let mut trial = Trial::new(self, positions, drive, settings, workspace);
         report.residual_mn = self.residual(positions, drive, workspace);
         if !report.residual_mn.is_finite() {

@@ -2,21 +2,26 @@
 //!
 //! The unknowns are already in a fill-reducing order (the mesh numbers them by nested dissection), so faer is asked to keep it.
 //! Sequential: two threads gain nothing at these sizes and change the last bits.
+//!
+//! A matrix is factorised in single precision, at half the cost, and its solutions are refined in double: residuals are those of the matrix as it is, and each step of refinement
+//! brings them down by what single precision leaves (J. H. Wilkinson, *Rounding Errors in Algebraic Processes*, 1963; J. Langou et al., SC 2006). Where that is too much, for the
+//! matrix is ill conditioned or close to indefinite, it is factorised once more in double precision.
+//! Read on in `numeric` (what faer is asked for).
+
+mod numeric;
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-    factorize_symbolic_cholesky,
+    CholeskySymbolicParams, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side, Spec};
+use faer::{Par, Side, Spec};
 use thiserror::Error;
 
 use super::dense::Dense;
 use crate::assemble::Pattern;
+use numeric::Numeric;
 
 /// Why a linear system was not solved.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -37,8 +42,12 @@ pub enum LinearSolveError {
 
 /// Largest relative residual of a linear solve that is accepted. Newton's method corrects what is left.
 const MAX_RELATIVE_RESIDUAL: f64 = 1e-6;
-/// Relative residual that one step of refinement is spent on.
-const REFINE_ABOVE: f64 = 1e-10;
+/// Steps of refinement at most; each brings the residual down by what the one before left.
+const MOST_REFINEMENTS: usize = 2;
+/// Right-hand sides that are solved for at once, at most: the residual, three directions of a drive and the slope of what is held.
+const MOST_COLUMNS: usize = 5;
+/// Relative residual above which single precision does not suffice: a factor this far off also tells Newton's method little about its steps.
+const SINGLE_SUFFICES: f64 = 1e-4;
 
 /// The analysed pattern; independent of values, shared between threads.
 #[derive(Debug)]
@@ -64,8 +73,10 @@ impl SymbolicFactor {
         let symbolic = factorize_symbolic_cholesky(matrix, Side::Upper, SymmetricOrdering::Identity, params)
             .map_err(|error| LinearSolveError::Analysis(error.to_string()))?;
         let scratch = StackReq::any_of(&[
+            symbolic.factorize_numeric_llt_scratch::<f32>(Par::Seq, Spec::default()),
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
-            symbolic.solve_in_place_scratch::<f64>(2, Par::Seq),
+            symbolic.solve_in_place_scratch::<f32>(MOST_COLUMNS, Par::Seq),
+            symbolic.solve_in_place_scratch::<f64>(MOST_COLUMNS, Par::Seq),
         ]);
         Ok(SymbolicFactor { symbolic, scratch })
     }
@@ -97,17 +108,44 @@ fn transposed(pattern: &Pattern) -> (Vec<u32>, Vec<u32>) {
     (starts, indices)
 }
 
+/// How many digits a factor has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Precision {
+    Single,
+    Double,
+}
+
 /// Memory of one numeric factorisation.
 pub struct Factor {
-    values: Vec<f64>,
+    single: Numeric<f32>,
+    double: Numeric<f64>,
+    /// Which of them is at hand.
+    at_hand: Precision,
+    /// Which is tried first.
+    first: Precision,
     stack: MemBuffer,
+    /// Entries of the matrix, then right-hand sides, in single precision.
+    rounded: Vec<f32>,
     residual: Vec<f64>,
 }
 
 impl Factor {
     /// Memory for factors of `symbolic`.
     pub fn new(symbolic: &SymbolicFactor) -> Self {
-        Factor { values: vec![0.0; symbolic.stored()], stack: MemBuffer::new(symbolic.scratch), residual: Vec::new() }
+        Factor {
+            single: Numeric::empty(),
+            double: Numeric::empty(),
+            at_hand: Precision::Single,
+            first: Precision::Single,
+            stack: MemBuffer::new(symbolic.scratch),
+            rounded: Vec::new(),
+            residual: Vec::new(),
+        }
+    }
+
+    /// Forgets that single precision did not suffice: what comes next is another system.
+    pub(super) fn begin(&mut self) {
+        self.first = Precision::Single;
     }
 
     /// Factorises the sparse part of `values` (layout of `pattern`).
@@ -120,29 +158,45 @@ impl Factor {
         pattern: &Pattern,
         values: &[f64],
     ) -> Result<(), LinearSolveError> {
-        let n = pattern.free;
-        let structure = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.rows);
-        let matrix = SparseColMatRef::new(structure, &values[..pattern.stored()]);
-        symbolic
-            .symbolic
-            .factorize_numeric_llt(
-                &mut self.values,
-                matrix,
-                Side::Lower,
-                LltRegularization::default(),
-                Par::Seq,
-                MemStack::new(&mut self.stack),
-                Spec::default(),
-            )
-            .map(|_| ())
-            .map_err(|_| LinearSolveError::Indefinite)
+        if self.first == Precision::Single {
+            self.round(&values[..pattern.stored()]);
+            let stack = MemStack::new(&mut self.stack);
+            self.at_hand = Precision::Single;
+            if self.single.factorize(&symbolic.symbolic, pattern, &self.rounded, stack) {
+                return Ok(());
+            }
+        }
+        // What seems indefinite in single precision may be definite in double.
+        self.factorize_in_double(symbolic, pattern, values)
+    }
+
+    fn factorize_in_double(
+        &mut self,
+        symbolic: &SymbolicFactor,
+        pattern: &Pattern,
+        values: &[f64],
+    ) -> Result<(), LinearSolveError> {
+        let stack = MemStack::new(&mut self.stack);
+        self.at_hand = Precision::Double;
+        match self.double.factorize(&symbolic.symbolic, pattern, &values[..pattern.stored()], stack) {
+            true => {
+                self.first = Precision::Double;
+                Ok(())
+            }
+            false => Err(LinearSolveError::Indefinite),
+        }
+    }
+
+    fn round(&mut self, values: &[f64]) {
+        self.rounded.clear();
+        self.rounded.extend(values.iter().map(|value| *value as f32));
     }
 
     /// Solves A x = b for right-hand sides laid out one after the other in `rhs`, in place, and checks each residual
-    /// (one step of refinement where it helps).
+    /// (steps of refinement where they help).
     ///
     /// # Errors
-    /// [`LinearSolveError::Inaccurate`].
+    /// As [`Factor::check`].
     pub fn solve(
         &mut self,
         symbolic: &SymbolicFactor,
@@ -160,16 +214,20 @@ impl Factor {
 
     /// As [`Factor::solve`], unchecked: what is made of the solutions is to be checked.
     pub(super) fn substitute(&mut self, symbolic: &SymbolicFactor, rhs: &mut [f64]) {
-        let n = symbolic.symbolic.nrows();
-        let factor = LltRef::new(&symbolic.symbolic, &self.values);
-        let rhs = MatMut::from_column_major_slice_mut(rhs, n, rhs.len() / n);
-        factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(&mut self.stack));
+        match self.at_hand {
+            Precision::Single => {
+                self.round(rhs);
+                self.single.substitute(&symbolic.symbolic, &mut self.rounded, MemStack::new(&mut self.stack));
+                rhs.iter_mut().zip(&self.rounded).for_each(|(x, rounded)| *x = f64::from(*rounded));
+            }
+            Precision::Double => self.double.substitute(&symbolic.symbolic, rhs, MemStack::new(&mut self.stack)),
+        }
     }
 
-    /// Checks that A x = b, with one step of refinement where it helps.
+    /// Checks that A x = b, with steps of refinement where they help, and with a factor in double precision where they do not.
     ///
     /// # Errors
-    /// [`LinearSolveError::Inaccurate`].
+    /// [`LinearSolveError::Inaccurate`]; [`LinearSolveError::Indefinite`] if the matrix proves to be so in double precision.
     pub(super) fn check(
         &mut self,
         symbolic: &SymbolicFactor,
@@ -178,49 +236,52 @@ impl Factor {
         x: &mut [f64],
         b: &[f64],
     ) -> Result<(), LinearSolveError> {
+        let mut relative = self.refine(symbolic, pattern, values, x, b);
+        if self.at_hand == Precision::Single && !is_accurate(relative) {
+            self.factorize_in_double(symbolic, pattern, values)?;
+            x.copy_from_slice(b);
+            self.substitute(symbolic, x);
+            relative = self.refine(symbolic, pattern, values, x, b);
+        }
+        if is_accurate(relative) { Ok(()) } else { Err(LinearSolveError::Inaccurate { relative_residual: relative }) }
+    }
+
+    /// The relative residual ‖b − A x‖ / ‖b‖, after steps of refinement if it is too large at first.
+    fn refine(
+        &mut self,
+        symbolic: &SymbolicFactor,
+        pattern: &Pattern,
+        values: &[f64],
+        x: &mut [f64],
+        b: &[f64],
+    ) -> f64 {
         let size = norm(b);
         if size == 0.0 {
-            return Ok(());
+            return 0.0;
         }
         let mut relative = self.residual_into(pattern, values, x, b) / size;
-        if relative > REFINE_ABOVE {
+        if self.at_hand == Precision::Single && relative > SINGLE_SUFFICES {
+            return relative;
+        }
+        for _ in 0..MOST_REFINEMENTS {
+            if is_accurate(relative) {
+                break;
+            }
             let mut correction = std::mem::take(&mut self.residual);
             self.substitute(symbolic, &mut correction);
-            for (x, c) in x.iter_mut().zip(&correction) {
-                *x += c;
-            }
+            x.iter_mut().zip(&correction).for_each(|(x, c)| *x += c);
             self.residual = correction;
             relative = self.residual_into(pattern, values, x, b) / size;
         }
-        if relative.is_nan() || relative > MAX_RELATIVE_RESIDUAL {
-            return Err(LinearSolveError::Inaccurate { relative_residual: relative });
-        }
-        Ok(())
+        relative
     }
 
     /// The last `size` rows and columns of the factor L, with a border of `border` rows of zeros.
     pub(super) fn tail(&self, symbolic: &SymbolicFactor, size: usize, border: usize) -> Dense {
-        let mut tail = Dense::zeros(size, border);
-        let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.symbolic.raw() else { return tail };
-        let first = raw.nrows() - size;
-        let factor = SupernodalLltRef::new(raw, &self.values);
-        for index in (0..raw.n_supernodes()).rev() {
-            let supernode = factor.supernode(index);
-            let (start, values) = (supernode.start(), supernode.val());
-            if start + values.ncols() <= first {
-                break;
-            }
-            for column in first.saturating_sub(start)..values.ncols() {
-                let to = start + column - first;
-                for row in column..values.ncols() {
-                    tail.set(start + row - first, to, values[(row, column)]);
-                }
-                for (row, &at) in supernode.pattern().iter().enumerate() {
-                    tail.set(at as usize - first, to, values[(values.ncols() + row, column)]);
-                }
-            }
+        match self.at_hand {
+            Precision::Single => self.single.tail(&symbolic.symbolic, size, border),
+            Precision::Double => self.double.tail(&symbolic.symbolic, size, border),
         }
-        tail
     }
 
     /// Leaves b − A x in `self.residual` and returns its norm.
@@ -241,6 +302,11 @@ impl Factor {
         }
         norm(&self.residual)
     }
+}
+
+/// Whether a relative residual is accepted; not a number is none.
+fn is_accurate(relative_residual: f64) -> bool {
+    relative_residual <= MAX_RELATIVE_RESIDUAL
 }
 
 /// Euclidean norm.
