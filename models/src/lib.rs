@@ -11,6 +11,7 @@ pub mod dataset;
 pub mod describe;
 pub mod evaluate;
 pub mod faithful;
+pub mod journal;
 pub mod parity;
 pub mod reference_error;
 pub mod sample;

@@ -34,7 +34,7 @@ const CASES: &[Case] = &[
     case("µ 0.015, leaning", || rough(0.015), || lean(ball(), 20.0, 40.0, 0.5), Answer(5)),
     case("µ 0.5, leaning", || rough(0.5), || lean(ball(), 20.0, 40.0, 0.5), Answer(7)),
     case("µ 2, leaning", || rough(2.0), || lean(ball(), 20.0, 40.0, 0.5), Answer(13)),
-    case("µ 2, straight", || rough(2.0), || push(ball(), 0.8), Answer(5)),
+    case("µ 2, straight", || rough(2.0), || push(ball(), 0.8), Answer(14)),
     case(
         "µ 2, 74° off the normal: pressure and friction hand the force to and fro",
         || rough(2.0),
@@ -79,7 +79,7 @@ const CASES: &[Case] = &[
         "µ 0.5, 15 to 60 mmHg, bond of 1 kPa, every effect",
         || everything(0.5, 60.0, 1.0),
         || all(lean(ball(), 20.0, 30.0, 0.5)),
-        Answer(86),
+        Answer(108),
     ),
     case(
         "µ 2, 15 to 0 mmHg, bond of 1 kPa, every effect",

@@ -1,6 +1,7 @@
 //! Needles at the ends of their ranges and in awkward places: fine and blunt tips, edges first, grazing, beside the patch, inside the tissue.
 //!
-//! Iterations: a round tip takes what the default needle takes (6 to 9); an edge finds its contact points one by one and takes up to three times that.
+//! Iterations: a round tip takes what the default needle takes (6 to 9); an edge finds its contact points one by one and takes up to three times that; where the tissue is about
+//! to buckle single precision goes astray and the way in double is added to what it took.
 
 use retina_core::needle::{NeedleShape, Tip};
 use retina_core::predict::{Level, Request};
@@ -84,7 +85,7 @@ const CASES: &[Case] = &[
         "fine tip held the retina's thickness deep",
         flat,
         || at(held(push(ball(0.05), 0.8)), 0.0, 0.0, -0.25),
-        Answer(20),
+        Answer(36),
     ),
     case(
         "flat tip held half the retina deep",

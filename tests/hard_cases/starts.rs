@@ -10,6 +10,7 @@ use retina_core::needle::{Body, NeedleShape};
 use retina_core::predict::finite_element::COARSE;
 use retina_core::progress::Silent;
 use retina_core::solve::newton::{Globalization, NewtonError, Workspace};
+use retina_core::solve::sparse::Precision;
 use retina_core::surface::Surface;
 use retina_core::tissue::Tissue;
 
@@ -155,6 +156,7 @@ fn a_single_solve_names_the_effect_that_cannot_start_there() {
     };
     for globalization in [Globalization::PredictedStress, Globalization::LineSearch] {
         let settings = NewtonSettings {
+            precision: Precision::Single,
             globalization,
             force_scale_mn: 0.01,
             tolerance_mn: 1e-9,

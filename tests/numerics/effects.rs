@@ -534,6 +534,40 @@ fn an_inverted_element_is_refused_and_steps_stop_before_it() {
     }
 }
 
+/// A bent face near the needle, at random.
+#[test]
+fn a_face_is_passed_over_only_where_no_point_of_it_acts() {
+    let (stencils, rest) = face(1.0);
+    let faces = ContactFaces::new(&stencils, &rest, 5);
+    for shape in shapes(1.0) {
+        let body = shape.body();
+        let (mut acting, mut passed) = (0, 0);
+        for seed in 0..400 {
+            let contact = Contact {
+                faces: &faces,
+                shape: &body,
+                frame_from_needle: turned(seed),
+                stiffness_kpa_per_mm: 5e4,
+                smoothing_mm: 5e-4,
+            };
+            let mut random = fastrand::Rng::with_seed(seed);
+            let mut current = vec![0.0; 3 * stencils.group_size];
+            stencils.gather(0, &rest, &mut current);
+            let size = current.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+            for (at, x) in current.iter_mut().enumerate() {
+                let is_needle = (at + 1) % stencils.group_size == 0;
+                *x += (2.0 * random.f64() - 1.0) * size * if is_needle { 2.0 } else { 0.3 };
+            }
+            let local = Local { current: &current, group: 0, predicted: &[] };
+            let acts = contact.energy(&local) > 0.0;
+            assert!(!acts || contact.is_active(&local), "{:?}, seed {seed}", shape.tip);
+            acting += usize::from(acts);
+            passed += usize::from(!contact.is_active(&local));
+        }
+        assert!(acting > 20 && passed > 20, "{:?}: {acting} act, {passed} are passed over", shape.tip);
+    }
+}
+
 #[test]
 fn a_contact_out_of_reach_is_inactive_and_exactly_zero() {
     let (stencils, rest) = face(1.0);

@@ -7,6 +7,7 @@
 mod budget;
 mod dataset;
 mod effects;
+mod factor;
 mod mesh;
 mod mesh_file;
 mod meshes;

@@ -8,7 +8,7 @@ use retina_core::mesh::element::{NODE_OFFSETS, QUADRATURE, gauss_rule, shapes};
 use retina_core::mesh::ordering::nested_dissection;
 use retina_core::mesh::sample::SurfaceLocator;
 use retina_core::mesh::wall::{LayerThickness, WallDivision, WallGeometry, WallTopology};
-use retina_core::solve::sparse::{Factor, LinearSolveError, SymbolicFactor};
+use retina_core::solve::sparse::SymbolicFactor;
 use retina_core::surface::Surface;
 use retina_tests::tolerance::{DERIVATIVE, ROUNDOFF};
 
@@ -138,8 +138,9 @@ fn the_disc_has_positive_cells_that_fill_it() {
 }
 
 /// A stand-in effect: an energy that is quadratic in the positions, with a different symmetric matrix for each group.
-struct Springs {
-    size: usize,
+pub struct Springs {
+    /// Vertices of a group.
+    pub size: usize,
 }
 
 impl Springs {
@@ -179,7 +180,7 @@ impl Effect for Springs {
 }
 
 /// Overlapping groups of three and two among nine vertices; the last vertex is driven, the first fixed, the second held in y.
-fn small() -> (Dofs, [Stencils; 2]) {
+pub fn small() -> (Dofs, [Stencils; 2]) {
     let threes = Stencils { group_size: 3, vertices: vec![0, 1, 2, 2, 3, 4, 4, 5, 6, 6, 7, 1, 3, 5, 7] };
     let twos = Stencils { group_size: 2, vertices: vec![1, 8, 4, 8, 0, 8, 6, 2] };
     let dofs = Dofs::new(9, [5, 2, 7, 1, 0, 3, 6, 4], |vertex, k| vertex == 0 || (vertex == 1 && k == 1), Some(8));
@@ -247,46 +248,6 @@ fn assembly_equals_a_dense_sum() {
     dofs.advance(&mut moved, &step, 0.5);
     assert_eq!(moved[..3], positions[..3]);
     assert_eq!(moved[25], positions[25] + 0.5 * step[dofs.free + 1]);
-}
-
-/// A factor's relative residuals for two right-hand sides on the small system with `shift` added to its diagonal.
-fn solved(shift: f64) -> Result<f64, LinearSolveError> {
-    let (dofs, stencils) = small();
-    let pattern = Pattern::new(&dofs, &[&stencils[0], &stencils[1]]);
-    let effects = [Springs { size: 3 }, Springs { size: 2 }];
-    let terms = [0, 1].map(|t| Term { effect: &effects[t], stencils: &stencils[t], set: t });
-    let mut values = vec![0.0; pattern.len()];
-    hessian(&terms, &[0.0; 27], &Predicted::default(), &pattern, &mut Scratch::default(), &mut values);
-    let n = dofs.free;
-    let mut dense = DMatrix::zeros(n, n);
-    for column in 0..n {
-        for at in pattern.column_starts[column] as usize..pattern.column_starts[column + 1] as usize {
-            let row = pattern.rows[at] as usize;
-            values[at] += if row == column { shift } else { 0.0 };
-            dense[(row, column)] = values[at];
-            dense[(column, row)] = values[at];
-        }
-    }
-    let symbolic = SymbolicFactor::new(&pattern)?;
-    let mut factor = Factor::new(&symbolic);
-    factor.factorize(&symbolic, &pattern, &values)?;
-    let mut random = noise(19);
-    let target: Vec<f64> = (0..2 * n).map(|_| random()).collect();
-    let mut rhs = target.clone();
-    factor.solve(&symbolic, &pattern, &values, &mut rhs)?;
-    let residual = |c: usize| {
-        let b = DVector::from_column_slice(&target[c * n..(c + 1) * n]);
-        (&dense * DVector::from_column_slice(&rhs[c * n..(c + 1) * n]) - &b).norm() / b.norm()
-    };
-    Ok(residual(0).max(residual(1)))
-}
-
-#[test]
-fn a_factor_solves_and_an_indefinite_matrix_is_refused() {
-    let residual = solved(0.0).unwrap();
-    assert!(residual < 1e-10, "{residual:e}");
-    assert_eq!(solved(-60.0), Err(LinearSolveError::Indefinite));
-    assert_eq!(solved(f64::NAN).unwrap_err(), LinearSolveError::Indefinite);
 }
 
 #[test]

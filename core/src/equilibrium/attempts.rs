@@ -12,11 +12,14 @@ use crate::progress::Progress;
 use crate::solve::newton::{
     Drive, Globalization, NewtonError, NewtonReport, NewtonSettings, System, Workspace, holding_force,
 };
+use crate::solve::sparse::Precision;
 
 /// One way to reach an equilibrium.
 pub(super) struct Attempt {
     load_steps: usize,
     globalization: Globalization,
+    /// In which precision matrices are factorised first.
+    precision: Precision,
     /// Newton iterations for each load step.
     max_iterations: usize,
     /// How many of them may find the tissue about to buckle.
@@ -38,11 +41,24 @@ const ROUNDING: f64 = 1e-15;
 const SMALLEST_FORCE_SHARE: f64 = 1e-5;
 /// Iterations of a direct attempt that may find the tissue about to buckle: those that came to rest took ten at most.
 const DIRECT_WEAKENED: usize = 15;
-/// What is tried, in this order: directly from the given start, then from first touch in load steps.
-const ATTEMPTS: [Attempt; 4] = [
+/// How many of them go directly from the start.
+const DIRECT: usize = 2;
+/// What is tried, in this order: directly from the given start, then from first touch in load steps. Far from linear, rounding decides where an iteration ends: what single
+/// precision does not find, double may.
+const ATTEMPTS: [Attempt; 5] = [
     Attempt {
         load_steps: 1,
         globalization: Globalization::PredictedStress,
+        precision: Precision::Single,
+        max_iterations: 45,
+        max_weakened: DIRECT_WEAKENED,
+        resumes: false,
+        travel_share: 1.0,
+    },
+    Attempt {
+        load_steps: 1,
+        globalization: Globalization::PredictedStress,
+        precision: Precision::Double,
         max_iterations: 45,
         max_weakened: DIRECT_WEAKENED,
         resumes: false,
@@ -51,6 +67,7 @@ const ATTEMPTS: [Attempt; 4] = [
     Attempt {
         load_steps: 4,
         globalization: Globalization::PredictedStress,
+        precision: Precision::Double,
         max_iterations: 30,
         max_weakened: 30,
         resumes: false,
@@ -59,6 +76,7 @@ const ATTEMPTS: [Attempt; 4] = [
     Attempt {
         load_steps: 8,
         globalization: Globalization::PredictedStress,
+        precision: Precision::Double,
         max_iterations: 30,
         max_weakened: 30,
         resumes: false,
@@ -67,6 +85,7 @@ const ATTEMPTS: [Attempt; 4] = [
     Attempt {
         load_steps: 12,
         globalization: Globalization::LineSearch,
+        precision: Precision::Double,
         max_iterations: 100,
         max_weakened: 100,
         resumes: false,
@@ -82,6 +101,7 @@ pub(super) const REPETITIONS: [Attempt; 2] = [
     Attempt {
         load_steps: 1,
         globalization: Globalization::PredictedStress,
+        precision: Precision::Double,
         max_iterations: 45,
         max_weakened: 45,
         resumes: true,
@@ -90,6 +110,7 @@ pub(super) const REPETITIONS: [Attempt; 2] = [
     Attempt {
         load_steps: 1,
         globalization: Globalization::LineSearch,
+        precision: Precision::Double,
         max_iterations: 100,
         max_weakened: 100,
         resumes: false,
@@ -100,6 +121,7 @@ pub(super) const REPETITIONS: [Attempt; 2] = [
 pub(super) const COUPLED: Attempt = Attempt {
     load_steps: 1,
     globalization: Globalization::PredictedStress,
+    precision: Precision::Single,
     max_iterations: 7,
     max_weakened: 3,
     resumes: false,
@@ -139,29 +161,7 @@ impl Wall<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<Equilibrium, EquilibriumError> {
-        let mut start = Some(positions);
-        let mut spent = 0;
-        let mut failure = EquilibriumError::Newton(NewtonError::Interrupted { iterations: 0 });
-        for attempt in &ATTEMPTS {
-            if spent >= MOST_ITERATIONS {
-                break;
-            }
-            let positions = start.take().unwrap_or_else(|| self.touching(load));
-            match self.follow(load, (attempt, tolerance), positions, &mut spent, workspace, progress) {
-                Ok(mut equilibrium) => {
-                    equilibrium.newton.iterations = spent;
-                    return Ok(equilibrium);
-                }
-                // Load steps may find a rest there, but one of tissue folded as no whole tissue would be.
-                Err(stop @ EquilibriumError::Torn { .. }) => return Err(stop),
-                Err(stop) if stop.is_interrupted() => return Err(stop),
-                Err(error) => failure = error,
-            }
-        }
-        if let EquilibriumError::Newton(NewtonError::NotConverged { iterations, .. }) = &mut failure {
-            *iterations = spent;
-        }
-        Err(failure)
+        self.solve_by(&ATTEMPTS, tolerance, load, positions, workspace, progress)
     }
 
     /// As [`Wall::solve`], without load steps where the start is no good one.
@@ -175,11 +175,45 @@ impl Wall<'_> {
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<Equilibrium, EquilibriumError> {
-        let mut spent = 0;
-        let direct = (&ATTEMPTS[0], self.contact.tolerance);
-        let mut found = self.follow(load, direct, positions, &mut spent, workspace, progress)?;
-        found.newton.iterations = spent;
-        Ok(found)
+        self.solve_by(&ATTEMPTS[..DIRECT], self.contact.tolerance, load, positions, workspace, progress)
+    }
+
+    /// The first of `attempts` that succeeds.
+    fn solve_by(
+        &self,
+        attempts: &[Attempt],
+        tolerance: f64,
+        load: &Load,
+        start: Vec<f64>,
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<Equilibrium, EquilibriumError> {
+        let (mut spent, mut spent_in_single) = (0, 0);
+        let mut failure = EquilibriumError::Newton(NewtonError::Interrupted { iterations: 0 });
+        for attempt in attempts {
+            if spent >= MOST_ITERATIONS {
+                break;
+            }
+            let positions = if attempt.load_steps == 1 { start.clone() } else { self.touching(load) };
+            match self.follow(load, (attempt, tolerance), positions, &mut spent, workspace, progress) {
+                Ok(mut equilibrium) => {
+                    equilibrium.newton.iterations = spent_in_single + spent;
+                    return Ok(equilibrium);
+                }
+                Err(stop) if stop.is_interrupted() => return Err(stop),
+                Err(error) if attempt.precision == Precision::Single => {
+                    spent_in_single += std::mem::take(&mut spent);
+                    failure = error;
+                }
+                // Load steps may find a rest there, but one of tissue folded as no whole tissue would be.
+                Err(stop @ EquilibriumError::Torn { .. }) => return Err(stop),
+                Err(error) => failure = error,
+            }
+        }
+        if let EquilibriumError::Newton(NewtonError::NotConverged { iterations, .. }) = &mut failure {
+            *iterations = spent_in_single + spent;
+        }
+        Err(failure)
     }
 
     /// The tissue at rest and the needle just overlapping it.
@@ -277,6 +311,7 @@ impl Wall<'_> {
         let light_mn = self.light_residual_mn(&terms[0], force_mn);
         let settings = NewtonSettings {
             globalization: attempt.globalization,
+            precision: attempt.precision,
             force_scale_mn: scale,
             tolerance_mn: (tolerance * scale).max(light_mn),
             max_iterations: attempt.max_iterations.min(MOST_ITERATIONS.saturating_sub(*spent)),

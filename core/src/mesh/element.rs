@@ -103,6 +103,11 @@ pub fn shapes(at: [f64; 3]) -> [Shape; NODES] {
     out
 }
 
+/// Those of the nodes of the face ζ = 1 at its point `at`, in the order of [`TOP_NODES`].
+pub fn face_shapes(at: [f64; 2]) -> [Shape; FACE_NODES] {
+    TOP_NODES.map(|node| serendipity([at[0], at[1], 1.0], NODE_OFFSETS[node].map(|o| o as f64 - 1.0)))
+}
+
 fn serendipity(at: [f64; 3], node: [f64; 3]) -> Shape {
     if let Some(mid) = (0..3).find(|&k| node[k] == 0.0) {
         // Mid-edge node: a bubble along its edge, linear across.

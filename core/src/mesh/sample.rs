@@ -1,6 +1,6 @@
 //! Reads the deformed inner surface at points given by their patch parameters.
 
-use super::element::{FACE_NODES, TOP_NODES, shapes};
+use super::element::{FACE_NODES, face_shapes};
 use super::wall::{WallGeometry, WallTopology};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -60,14 +60,12 @@ impl<'a> SurfaceLocator<'a> {
 
 /// Shape function values at the point of the face whose image is `at`, if it lies in the face.
 fn invert(nodes: &[[f64; 2]; FACE_NODES], at: [f64; 2]) -> Option<[f64; FACE_NODES]> {
-    let top = &*TOP_NODES;
     let mut local = Vector2::zeros();
     for _ in 0..INVERSION_STEPS {
-        let shapes = shapes([local[0], local[1], 1.0]);
-        let on_face = || top.iter().map(|&a| &shapes[a]);
+        let shapes = face_shapes(local.into());
         let mut image = Vector2::zeros();
         let mut jacobian = Matrix2::zeros();
-        for (shape, node) in on_face().zip(nodes) {
+        for (shape, node) in shapes.iter().zip(nodes) {
             for i in 0..2 {
                 image[i] += shape.value * node[i];
                 for k in 0..2 {
@@ -83,7 +81,7 @@ fn invert(nodes: &[[f64; 2]; FACE_NODES], at: [f64; 2]) -> Option<[f64; FACE_NOD
         }
         if step.amax() < 1e-13 {
             let inside = local.amax() <= 1.0 + EDGE_TOLERANCE;
-            return inside.then(|| top.map(|a| shapes[a].value));
+            return inside.then(|| shapes.map(|shape| shape.value));
         }
     }
     None

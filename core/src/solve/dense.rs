@@ -5,6 +5,8 @@ use faer::linalg::cholesky::llt::{factor, solve};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, MatMut, MatRef, Par, Spec};
 
+use crate::kernel::{Kernel, run_kernel};
+
 /// The lower triangle of a symmetric matrix, column by column, with a border of a few rows more that is carried along and not solved for.
 #[derive(Debug)]
 pub(super) struct Dense {
@@ -93,16 +95,7 @@ impl Dense {
     /// The symmetric matrix times a vector.
     pub fn times(&self, vector: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; self.size];
-        for (column, entries) in self.values.chunks_exact(self.stride).take(self.size).enumerate() {
-            let below = &entries[column + 1..self.size];
-            let scale = vector[column];
-            let mut sum = entries[column] * scale;
-            for ((entry, out), x) in below.iter().zip(&mut out[column + 1..]).zip(&vector[column + 1..]) {
-                *out += entry * scale;
-                sum += entry * x;
-            }
-            out[column] += sum;
-        }
+        run_kernel(SymmetricProduct { matrix: self, vector, out: &mut out });
         out
     }
 
@@ -120,5 +113,48 @@ impl Dense {
         let mut memory = MemBuffer::new(solve::solve_in_place_scratch::<f64>(self.size, count, Par::Seq));
         let columns = MatMut::from_column_major_slice_mut(columns, self.size, count);
         solve::solve_in_place(self.inner(), columns, Par::Seq, MemStack::new(&mut memory));
+    }
+}
+
+/// Numbers that are added up side by side.
+const LANES: usize = 8;
+
+/// Adds the symmetric matrix times `vector` to `out`, column by column: what is below the diagonal stands also beside it.
+struct SymmetricProduct<'a> {
+    matrix: &'a Dense,
+    vector: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl Kernel for SymmetricProduct<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Dense { size, stride, values } = self.matrix;
+        for (column, entries) in values.chunks_exact(*stride).take(*size).enumerate() {
+            let (below, scale) = (&entries[column + 1..*size], self.vector[column]);
+            let vector = &self.vector[column + 1..*size];
+            let [own, out @ ..] = &mut self.out[column..*size] else { break };
+            for (out, entry) in out.iter_mut().zip(below) {
+                *out += entry * scale;
+            }
+            let (whole, rest) = below.as_chunks::<LANES>();
+            let (vectors, last) = vector.as_chunks::<LANES>();
+            let mut sums = [0.0; LANES];
+            for (entries, vector) in whole.iter().zip(vectors) {
+                for lane in 0..LANES {
+                    sums[lane] += entries[lane] * vector[lane];
+                }
+            }
+            let mut sum = entries[column] * scale;
+            for (entry, x) in rest.iter().zip(last) {
+                sum += entry * x;
+            }
+            for part in sums {
+                sum += part;
+            }
+            *own += sum;
+        }
     }
 }

@@ -23,7 +23,7 @@ use super::condensed::Condensed;
 pub use super::globalization::Globalization;
 use super::globalization::{Step, Trial};
 use super::held::Held;
-use super::sparse::{Factor, LinearSolveError, SymbolicFactor, norm};
+use super::sparse::{Factor, LinearSolveError, Precision, SymbolicFactor, norm};
 use crate::assemble::{Dofs, Pattern, Scratch, energy, gradient};
 use crate::effect::Term;
 use crate::progress::Progress;
@@ -33,6 +33,8 @@ use crate::progress::Progress;
 pub struct NewtonSettings {
     /// How steps are guarded.
     pub globalization: Globalization,
+    /// In which precision matrices are factorised first.
+    pub precision: Precision,
     /// Size of the forces at play (mN).
     pub force_scale_mn: f64,
     /// Largest residual force: Euclidean norm over all unknowns (mN).
@@ -221,7 +223,7 @@ impl System<'_> {
         let mut report = NewtonReport::default();
         let mut weakenings = 0;
         let mut chords_below_mn = CHORD_BELOW * settings.force_scale_mn;
-        workspace.factor.begin();
+        workspace.factor.begin(settings.precision);
         let mut trial = Trial::new(self, positions, drive, settings, workspace);
         report.residual_mn = self.residual(positions, drive, workspace);
         if !report.residual_mn.is_finite() {
@@ -241,7 +243,11 @@ impl System<'_> {
             let weakened = self.factorize_definite(positions, &mut trial, workspace)?;
             report.shifts += weakened;
             weakenings += usize::from(weakened > 0);
-            let (plain, slope) = self.step(drive, settings.max_travel_mm, workspace)?;
+            let (plain, slope) = match self.step(drive, settings.max_travel_mm, workspace) {
+                // Definite in single precision alone: in double it is changed until it is.
+                Err(NewtonError::Linear(LinearSolveError::Indefinite)) => continue,
+                step => step?,
+            };
             report.iterations += 1;
             if let Some(&change) = plain.get(self.dofs.free + 3) {
                 self.change_multiplier(change);
@@ -311,14 +317,36 @@ impl System<'_> {
     ) -> Result<bool, NewtonError> {
         let before = positions.to_vec();
         let plain = self.step_again(drive, settings.max_travel_mm, workspace)?;
-        let step = if report.residual_mn > REFINED_ABOVE * settings.force_scale_mn {
-            self.refine(&before, &plain, drive, settings.max_travel_mm, workspace).unwrap_or(plain)
-        } else {
-            plain
+        let refined =
+            |workspace: &mut Workspace| self.refine(&before, &plain, drive, settings.max_travel_mm, workspace);
+        let first = match report.residual_mn > REFINED_ABOVE * settings.force_scale_mn {
+            true => refined(workspace),
+            false => None,
         };
+        let pays = self.take_chord(positions, first.as_ref().unwrap_or(&plain), drive, settings, report, workspace);
+        if pays.is_some() || first.is_some() {
+            return Ok(pays.unwrap_or(false));
+        }
+        // Where points still touch or let go, the step that meets the contact as it is does what the plain one does not.
+        let second = refined(workspace);
+        let pays = second.and_then(|step| self.take_chord(positions, &step, drive, settings, report, workspace));
+        Ok(pays.unwrap_or(false))
+    }
+
+    /// Takes `step`; whether another one pays. `None` where it does not bring the residual down enough: then it is taken back.
+    fn take_chord(
+        &self,
+        positions: &mut [f64],
+        step: &[f64],
+        drive: Drive,
+        settings: &NewtonSettings,
+        report: &mut NewtonReport,
+        workspace: &mut Workspace,
+    ) -> Option<bool> {
+        let before = positions.to_vec();
         let change = step.get(self.dofs.free + 3).copied().unwrap_or_default();
         self.change_multiplier(change);
-        self.dofs.advance(positions, &step, 1.0);
+        self.dofs.advance(positions, step, 1.0);
         let residual_mn = self.residual(positions, drive, workspace);
         report.chords += 1;
         let rate = residual_mn / report.residual_mn;
@@ -326,12 +354,12 @@ impl System<'_> {
         if rate <= CHORD_REDUCTION {
             report.residual_mn = residual_mn;
             let left = (settings.tolerance_mn / residual_mn).ln() / rate.ln();
-            return Ok(left <= MOST_CHORDS_LEFT);
+            return Some(left <= MOST_CHORDS_LEFT);
         }
         positions.copy_from_slice(&before);
         self.change_multiplier(-change);
         report.residual_mn = self.residual(positions, drive, workspace);
-        Ok(false)
+        None
     }
 
     fn bad_start(&self, positions: &[f64], scratch: &mut Scratch) -> NewtonError {

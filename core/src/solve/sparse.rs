@@ -41,7 +41,7 @@ pub enum LinearSolveError {
 }
 
 /// Largest relative residual of a linear solve that is accepted. Newton's method corrects what is left.
-const MAX_RELATIVE_RESIDUAL: f64 = 1e-6;
+pub const MAX_RELATIVE_RESIDUAL: f64 = 1e-6;
 /// Steps of refinement at most; each brings the residual down by what the one before left.
 const MOST_REFINEMENTS: usize = 2;
 /// Right-hand sides that are solved for at once, at most: the residual, three directions of a drive and the slope of what is held.
@@ -110,8 +110,10 @@ fn transposed(pattern: &Pattern) -> (Vec<u32>, Vec<u32>) {
 
 /// How many digits a factor has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Precision {
+pub enum Precision {
+    /// Seven.
     Single,
+    /// Sixteen.
     Double,
 }
 
@@ -143,9 +145,9 @@ impl Factor {
         }
     }
 
-    /// Forgets that single precision did not suffice: what comes next is another system.
-    pub(super) fn begin(&mut self) {
-        self.first = Precision::Single;
+    /// What comes next is another system, factorised in `first` first: whether single precision sufficed before is forgotten.
+    pub(super) fn begin(&mut self, first: Precision) {
+        self.first = first;
     }
 
     /// Factorises the sparse part of `values` (layout of `pattern`).
@@ -165,8 +167,9 @@ impl Factor {
             if self.single.factorize(&symbolic.symbolic, pattern, &self.rounded, stack) {
                 return Ok(());
             }
+            // What seems indefinite in single precision may be definite in double; and what is about to buckle is close to singular from here on.
+            self.first = Precision::Double;
         }
-        // What seems indefinite in single precision may be definite in double.
         self.factorize_in_double(symbolic, pattern, values)
     }
 
@@ -179,10 +182,7 @@ impl Factor {
         let stack = MemStack::new(&mut self.stack);
         self.at_hand = Precision::Double;
         match self.double.factorize(&symbolic.symbolic, pattern, &values[..pattern.stored()], stack) {
-            true => {
-                self.first = Precision::Double;
-                Ok(())
-            }
+            true => Ok(()),
             false => Err(LinearSolveError::Indefinite),
         }
     }
@@ -227,7 +227,7 @@ impl Factor {
     /// Checks that A x = b, with steps of refinement where they help, and with a factor in double precision where they do not.
     ///
     /// # Errors
-    /// [`LinearSolveError::Inaccurate`]; [`LinearSolveError::Indefinite`] if the matrix proves to be so in double precision.
+    /// [`LinearSolveError::Inaccurate`]; [`LinearSolveError::Indefinite`] if the matrix proves to be so in double precision, which the next one is factorised in at once.
     pub(super) fn check(
         &mut self,
         symbolic: &SymbolicFactor,
@@ -238,6 +238,7 @@ impl Factor {
     ) -> Result<(), LinearSolveError> {
         let mut relative = self.refine(symbolic, pattern, values, x, b);
         if self.at_hand == Precision::Single && !is_accurate(relative) {
+            self.first = Precision::Double;
             self.factorize_in_double(symbolic, pattern, values)?;
             x.copy_from_slice(b);
             self.substitute(symbolic, x);

@@ -1,14 +1,12 @@
 //! `reference-error`: what refining the mesh of level `reference` still changes; written into the core.
 
-use std::collections::HashMap;
 use std::error::Error;
-use std::fs::{self, OpenOptions};
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::ProgressBar;
 
+use crate::journal::Journal;
 use crate::reference_error::{Change, Draws, measure, source};
 use crate::train::checkpoint::write_whole;
 
@@ -39,27 +37,12 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let Arguments { requests, draws, seed, out } = arguments;
     let path = format!("{}/../target/reference_error-{seed}.jsonl", env!("CARGO_MANIFEST_DIR"));
-    let mut known: HashMap<usize, Option<Change>> = HashMap::new();
-    for line in fs::read_to_string(&path).unwrap_or_default().lines() {
-        // A line cut short by an interruption is computed again.
-        if let Ok((index, change)) = serde_json::from_str(line) {
-            known.insert(index, change);
-        }
-    }
-    let mut journal = OpenOptions::new().create(true).append(true).open(&path)?;
+    let mut journal: Journal<Option<Change>> = Journal::open(path.as_ref())?;
     let mut draws = Draws::new(*requests, *draws, *seed)?;
     let bar = ProgressBar::new(draws.wanted() as u64);
     let mut without = 0;
     while let Some(drawn) = draws.next_wanted() {
-        let change = match known.remove(&drawn.index) {
-            Some(change) => change,
-            None => {
-                let change = measure(&mut draws, &drawn);
-                // A line of its own even after one cut short.
-                writeln!(journal, "\n{}", serde_json::to_string(&(drawn.index, &change))?)?;
-                change
-            }
-        };
+        let change = journal.take_or_find(drawn.index as u64, || measure(&mut draws, &drawn))?;
         without += usize::from(change.is_none());
         if let Some(change) = change {
             draws.keep(change);

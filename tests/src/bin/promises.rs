@@ -5,10 +5,7 @@
 //! interrupted run goes on where it stopped. Then all are asked, one at a time, in some ten minutes: deadlines are promised for an idle machine, and what else it was
 //! busy with meanwhile is told.
 
-use std::collections::HashMap;
 use std::error::Error;
-use std::fs::{self, OpenOptions};
-use std::io::Write as _;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use nalgebra::Point3;
@@ -17,6 +14,7 @@ use retina_core::progress::Silent;
 use retina_core::scene::Scene;
 use retina_core::working_range::WorkingRange;
 use retina_models::dataset::truth::{NAME, TRUTH};
+use retina_models::journal::Journal;
 use retina_tests::local_service;
 use retina_tests::machine_time::{MachineTime, cpu_seconds};
 use retina_tests::promise::question::{Asked, asked, body};
@@ -91,29 +89,16 @@ fn truths(
     seed: u64,
 ) -> Result<Vec<Option<Vertices>>, Box<dyn Error>> {
     let path = format!("{}/../target/promises-{seed}.jsonl", env!("CARGO_MANIFEST_DIR"));
-    let mut known: HashMap<usize, Option<Vec<[f64; 3]>>> = HashMap::new();
-    for line in fs::read_to_string(&path).unwrap_or_default().lines() {
-        // A line cut short by an interruption is computed again.
-        if let Ok((index, truth)) = serde_json::from_str(line) {
-            known.insert(index, truth);
-        }
-    }
-    let mut journal = OpenOptions::new().create(true).append(true).open(&path)?;
+    let mut journal: Journal<Option<Vec<[f64; 3]>>> = Journal::open(path.as_ref())?;
     let bar = bar(questions.len(), "truth")?;
     let mut workspace = Workspace::default();
     let mut truths = Vec::new();
     for (index, question) in questions.iter().enumerate() {
-        let truth = match known.remove(&index) {
-            Some(truth) => truth,
-            None => {
-                let precise = Request { level: Level::Reference, ..question.request.clone() };
-                let truth = scenes[question.scene].predict_at(&precise, &TRUTH, &mut workspace, &mut Silent);
-                let truth = truth.ok().map(|truth| truth.vertices.iter().map(|at| at.coords.into()).collect());
-                // A line of its own even after one cut short.
-                writeln!(journal, "\n{}", serde_json::to_string(&(index, &truth))?)?;
-                truth
-            }
-        };
+        let truth = journal.take_or_find(index as u64, || {
+            let precise = Request { level: Level::Reference, ..question.request.clone() };
+            let truth = scenes[question.scene].predict_at(&precise, &TRUTH, &mut workspace, &mut Silent);
+            truth.ok().map(|truth| truth.vertices.iter().map(|at| at.coords.into()).collect())
+        })?;
         truths.push(truth.map(|truth| truth.into_iter().map(Point3::from).collect()));
         bar.inc(1);
     }

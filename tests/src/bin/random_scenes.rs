@@ -8,15 +8,14 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::fs::{self, OpenOptions};
-use std::io::Write as _;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use retina_core::comparison::quantile;
 use retina_core::predict::{PreparedScene, Workspace};
+use retina_models::journal::Journal;
 use retina_tests::random_scene::{REQUEST_UNITS, RequestNumbers, SCENE_UNITS, SceneNumbers, shrink, units};
 use retina_tests::search::{Class, Outcome, REQUESTS_PER_TISSUE, ask, prepare, request, tissue};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// Trials per run unless told.
 const COUNT: u64 = 10_000;
@@ -24,13 +23,6 @@ const COUNT: u64 = 10_000;
 const SEED: u64 = 1;
 /// Trials named in the report for each way to fail.
 const NAMED: usize = 5;
-
-/// All trials of one tissue.
-#[derive(Serialize, Deserialize)]
-struct Line {
-    tissue: u64,
-    outcomes: Vec<Outcome>,
-}
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -42,29 +34,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let count: u64 = arguments.first().map_or(Ok(COUNT), |a| a.parse())?;
     let seed: u64 = arguments.get(1).map_or(Ok(SEED), |a| a.parse())?;
     let path = format!("{}/../target/random_scenes-{seed}.jsonl", env!("CARGO_MANIFEST_DIR"));
-    let mut known: BTreeMap<u64, Vec<Outcome>> = BTreeMap::new();
-    for line in fs::read_to_string(&path).unwrap_or_default().lines() {
-        // A line cut short by an interruption is tried again.
-        if let Ok(line) = serde_json::from_str::<Line>(line) {
-            known.insert(line.tissue, line.outcomes);
-        }
-    }
-    let mut journal = OpenOptions::new().create(true).append(true).open(&path)?;
+    let mut journal: Journal<Vec<Outcome>> = Journal::open(path.as_ref())?;
     let tissues = count.div_ceil(REQUESTS_PER_TISSUE);
     let bar = ProgressBar::new(count).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {eta}")?);
     let mut workspace = Workspace::default();
+    let mut outcomes = Vec::new();
     for index in 0..tissues {
-        if let std::collections::btree_map::Entry::Vacant(place) = known.entry(index) {
-            let outcomes = try_tissue(seed, index, &mut workspace);
-            // A line of its own even after one cut short.
-            writeln!(journal, "\n{}", serde_json::to_string(&Line { tissue: index, outcomes: outcomes.clone() })?)?;
-            place.insert(outcomes);
-        }
+        outcomes.extend(journal.take_or_find(index, || try_tissue(seed, index, &mut workspace))?);
         bar.inc(REQUESTS_PER_TISSUE);
     }
     bar.finish();
-    let outcomes: Vec<Outcome> =
-        (0..tissues).flat_map(|index| known.remove(&index).unwrap_or_default()).take(count as usize).collect();
+    outcomes.truncate(count as usize);
     report(&outcomes, tissues, seed);
     Ok(())
 }

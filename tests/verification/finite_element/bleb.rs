@@ -14,6 +14,7 @@ use retina_core::mesh::wall::{Place, WallDivision, WallTopology};
 use retina_core::needle::NeedleShape;
 use retina_core::progress::Silent;
 use retina_core::solve::newton::{Drive, Globalization, NewtonSettings, System, Workspace};
+use retina_core::solve::sparse::Precision;
 use retina_core::surface::Surface;
 use retina_core::tissue::{Layer, Tissue};
 
@@ -273,6 +274,7 @@ fn a_line_search_finds_the_pressure_that_full_steps_find() {
         let driven = Some(plate.topology.needle());
         let system = System { terms: &terms, dofs, pattern, symbolic, driven, dead_load: &[] };
         let settings = NewtonSettings {
+            precision: Precision::Single,
             globalization,
             force_scale_mn: 0.01,
             tolerance_mn: 1e-9,

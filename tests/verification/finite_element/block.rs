@@ -12,7 +12,7 @@ use retina_core::mesh::disc::{DiscGeometry, DiscTopology};
 use retina_core::mesh::element::{NODE_OFFSETS, NODES, ORDER, gauss_rule, shapes};
 use retina_core::progress::Silent;
 use retina_core::solve::newton::{Drive, Globalization, NewtonReport, NewtonSettings, System, Workspace};
-use retina_core::solve::sparse::SymbolicFactor;
+use retina_core::solve::sparse::{Precision, SymbolicFactor};
 
 /// Rest positions of one element's nodes, in local order.
 pub type ElementNodes = [[f64; 3]; NODES];
@@ -372,6 +372,7 @@ impl<'a> Body<'a> {
             }
         }
         let settings = NewtonSettings {
+            precision: Precision::Single,
             globalization: Globalization::PredictedStress,
             force_scale_mn,
             tolerance_mn: tolerance * force_scale_mn,

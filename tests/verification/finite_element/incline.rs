@@ -14,7 +14,7 @@ use retina_core::mesh::element::TOP_NODES;
 use retina_core::needle::NeedleShape;
 use retina_core::progress::Silent;
 use retina_core::solve::newton::{Drive, Globalization, NewtonError, NewtonSettings, System, Workspace};
-use retina_core::solve::sparse::SymbolicFactor;
+use retina_core::solve::sparse::{Precision, SymbolicFactor};
 
 use super::block::{Mesh, block, lame};
 
@@ -92,6 +92,7 @@ fn lean(coefficient: f64, tangent: f64) -> Result<(Vector3<f64>, Vector3<f64>), 
         let (dofs, pattern, symbolic) = (&dofs, &pattern, &symbolic);
         let system = System { terms: &terms, dofs, pattern, symbolic, driven: Some(needle), dead_load: &load };
         let settings = NewtonSettings {
+            precision: Precision::Single,
             globalization: Globalization::LineSearch,
             force_scale_mn: NORMAL_MN,
             tolerance_mn: 1e-7 * NORMAL_MN,

@@ -15,7 +15,7 @@ use retina_core::effects::solid::SolidGeometry;
 use retina_core::mesh::element::TOP_NODES;
 use retina_core::progress::Silent;
 use retina_core::solve::newton::{Drive, Globalization, NewtonError, NewtonSettings, System, Workspace};
-use retina_core::solve::sparse::SymbolicFactor;
+use retina_core::solve::sparse::{Precision, SymbolicFactor};
 
 use super::block::{Law, Mesh, block, lame};
 
@@ -78,6 +78,7 @@ impl Sphere {
         let (dofs, pattern, symbolic) = (&self.dofs, &self.pattern, &self.symbolic);
         let system = System { terms: &terms, dofs, pattern, symbolic, driven: None, dead_load: &[] };
         let settings = NewtonSettings {
+            precision: Precision::Single,
             globalization: Globalization::PredictedStress,
             force_scale_mn: pressure_kpa.abs(),
             tolerance_mn: 1e-7 * pressure_kpa.abs(),

@@ -13,7 +13,7 @@ use retina_core::effects::solid::SolidGeometry;
 use retina_core::mesh::element::{NODE_OFFSETS, TOP_NODES};
 use retina_core::progress::Silent;
 use retina_core::solve::newton::{Drive, Globalization, NewtonSettings, System, Workspace};
-use retina_core::solve::sparse::SymbolicFactor;
+use retina_core::solve::sparse::{Precision, SymbolicFactor};
 
 use super::block::{Mesh, block, lame};
 
@@ -79,6 +79,7 @@ fn peel_force(fracture_energy: f64) -> f64 {
         let (dofs, pattern, symbolic) = (&dofs, &pattern, &symbolic);
         let system = System { terms: &terms, dofs, pattern, symbolic, driven: None, dead_load: &[] };
         let settings = NewtonSettings {
+            precision: Precision::Single,
             globalization: Globalization::LineSearch,
             force_scale_mn: fracture_energy * WIDTH_MM,
             tolerance_mn: 1e-5 * fracture_energy * WIDTH_MM,

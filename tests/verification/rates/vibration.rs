@@ -12,7 +12,7 @@ use retina_core::effects::solid::SolidGeometry;
 use retina_core::mesh::element::{FACE_NODES, NODE_OFFSETS, TOP_NODES};
 use retina_core::progress::Silent;
 use retina_core::solve::newton::{Drive, Globalization, NewtonSettings, System, Workspace};
-use retina_core::solve::sparse::SymbolicFactor;
+use retina_core::solve::sparse::{Precision, SymbolicFactor};
 use retina_tests::tolerance::ROUNDOFF;
 
 use crate::finite_element::block::{Mesh, block, lame};
@@ -81,6 +81,7 @@ impl Column {
         let dead_load = vec![load_mn; dofs.free];
         let system = System { terms: &terms, dofs, pattern, symbolic, driven: None, dead_load: &dead_load };
         let settings = NewtonSettings {
+            precision: Precision::Single,
             globalization: Globalization::PredictedStress,
             force_scale_mn: 1e-3,
             tolerance_mn: 1e-12,

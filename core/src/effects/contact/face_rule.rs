@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::Matrix3;
 
 use crate::effect::LOWER_BLOCKS;
-use crate::mesh::element::{FACE_NODES, TOP_NODES, gauss_rule, shapes};
+use crate::mesh::element::{FACE_NODES, face_shapes, gauss_rule};
 
 /// Vertices of a group: those of the face, then the needle.
 pub const GROUP: usize = FACE_NODES + 1;
@@ -43,17 +43,16 @@ impl FaceRule {
         let mut out = FaceRule { weights: Vec::new(), slopes: Vec::new(), pairs: Vec::new() };
         for &(eta, w_eta) in &rule {
             for &(xi, w_xi) in &rule {
-                let shape = shapes([xi, eta, 1.0]);
+                let shapes = face_shapes([xi, eta]);
                 let mut weights = [-1.0; GROUP];
-                for (weight, &node) in weights.iter_mut().zip(TOP_NODES.iter()) {
-                    *weight = shape[node].value;
+                for (weight, shape) in weights.iter_mut().zip(&shapes) {
+                    *weight = shape.value;
                 }
                 let mut pairs = [0.0; PAIRS];
                 let products = (0..GROUP).flat_map(|a| (0..=a).map(move |b| weights[a] * weights[b]));
                 pairs.iter_mut().zip(products).for_each(|(pair, product)| *pair = product);
                 out.weights.push(weights);
-                out.slopes
-                    .push((w_xi * w_eta, TOP_NODES.map(|node| [shape[node].gradient[0], shape[node].gradient[1]])));
+                out.slopes.push((w_xi * w_eta, shapes.map(|shape| [shape.gradient[0], shape.gradient[1]])));
                 out.pairs.push(pairs);
             }
         }
