@@ -1,7 +1,7 @@
 //! Where the levels stood before: the results of an earlier program beside those of this one.
 //!
-//! `docs/accuracy/before.json` is the `results.json` that the program of an earlier commit wrote for the same requests, on the same machine shortly before; its
-//! circumstances name the commit. Without that file there is nothing to compare.
+//! `docs/accuracy/before.json` is the `results.json` that the program of an earlier commit wrote for the same requests in a run of its own; its
+//! circumstances name the commit and the machine, and the row of `linear` tells how fast that was then. Without that file there is nothing to compare.
 
 use std::fmt::Write;
 use std::{fs, io, path::Path};
