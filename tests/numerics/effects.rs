@@ -534,6 +534,11 @@ fn an_inverted_element_is_refused_and_steps_stop_before_it() {
     }
 }
 
+/// A contact of the retina's scale under a needle turned at random.
+fn stiff_contact<'a>(faces: &'a ContactFaces, shape: &'a Body, seed: u64) -> Contact<'a> {
+    Contact { faces, shape, frame_from_needle: turned(seed), stiffness_kpa_per_mm: 5e4, smoothing_mm: 5e-4 }
+}
+
 /// A bent face near the needle, at random.
 #[test]
 fn a_face_is_passed_over_only_where_no_point_of_it_acts() {
@@ -543,13 +548,7 @@ fn a_face_is_passed_over_only_where_no_point_of_it_acts() {
         let body = shape.body();
         let (mut acting, mut passed) = (0, 0);
         for seed in 0..400 {
-            let contact = Contact {
-                faces: &faces,
-                shape: &body,
-                frame_from_needle: turned(seed),
-                stiffness_kpa_per_mm: 5e4,
-                smoothing_mm: 5e-4,
-            };
+            let contact = stiff_contact(&faces, &body, seed);
             let mut random = fastrand::Rng::with_seed(seed);
             let mut current = vec![0.0; 3 * stencils.group_size];
             stencils.gather(0, &rest, &mut current);
@@ -575,13 +574,7 @@ fn a_contact_out_of_reach_is_inactive_and_exactly_zero() {
     for shape in shapes(1.0) {
         let body = shape.body();
         for seed in 0..20 {
-            let contact = Contact {
-                faces: &faces,
-                shape: &body,
-                frame_from_needle: turned(seed),
-                stiffness_kpa_per_mm: 5e4,
-                smoothing_mm: 5e-4,
-            };
+            let contact = stiff_contact(&faces, &body, seed);
             for gap in [5.0001e-4, 0.1, 2.0, 10.0] {
                 let current = pressed(&contact, &stencils, &rest, gap, 1.0, seed);
                 let local = Local { current: &current, group: 0, predicted: &[] };
