@@ -196,7 +196,7 @@ impl Factor {
     /// (steps of refinement where they help).
     ///
     /// # Errors
-    /// As [`Factor::check`].
+    /// [`LinearSolveError::Inaccurate`]; [`LinearSolveError::Indefinite`] if the matrix proves to be so in double precision.
     pub fn solve(
         &mut self,
         symbolic: &SymbolicFactor,
