@@ -22,7 +22,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::contact::ContactFaces;
 use crate::effect::{Effect, Local, Stencils};
-use crate::mesh::element::{FACE_NODES, TOP_NODES, gauss_rule, shapes};
+use crate::mesh::element::{FACE_NODES, face_shapes, gauss_rule};
 use rate::Opened;
 
 /// Name of the effect.
@@ -100,8 +100,8 @@ impl Interface {
         let rule = gauss_rule(POINTS_PER_EDGE);
         let slopes: Vec<_> = rule
             .iter()
-            .flat_map(|&(eta, _)| rule.iter().map(move |&(xi, _)| shapes([xi, eta, 1.0])))
-            .map(|shape| TOP_NODES.map(|a| shape[a].gradient))
+            .flat_map(|&(eta, _)| rule.iter().map(move |&(xi, _)| face_shapes([xi, eta])))
+            .map(|shapes| shapes.map(|shape| shape.gradient))
             .collect();
         let mut normals = Vec::with_capacity(stencils.len() * slopes.len());
         for face in 0..stencils.len() {

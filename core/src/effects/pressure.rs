@@ -17,7 +17,7 @@ use std::sync::LazyLock;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::effect::{Effect, Local};
-use crate::mesh::element::{FACE_NODES, TOP_NODES, gauss_rule, shapes};
+use crate::mesh::element::{FACE_NODES, face_shapes, gauss_rule};
 
 /// Name of the effect.
 pub const NAME: &str = "pressure";
@@ -35,11 +35,11 @@ pub(super) static FACE_POINTS: LazyLock<Vec<FacePoint>> = LazyLock::new(|| {
     let rule = gauss_rule(POINTS_PER_EDGE);
     let pairs = rule.iter().flat_map(|&(eta, w_eta)| rule.iter().map(move |&(xi, w_xi)| (xi, eta, w_xi * w_eta)));
     let point = |(xi, eta, weight): (f64, f64, f64)| {
-        let shape = shapes([xi, eta, 1.0]);
+        let shapes = face_shapes([xi, eta]);
         let values = [
-            TOP_NODES.map(|a| shape[a].value),
-            TOP_NODES.map(|a| shape[a].gradient[0]),
-            TOP_NODES.map(|a| shape[a].gradient[1]),
+            shapes.map(|shape| shape.value),
+            shapes.map(|shape| shape.gradient[0]),
+            shapes.map(|shape| shape.gradient[1]),
         ];
         FacePoint { weight, values }
     };
