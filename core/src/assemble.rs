@@ -23,12 +23,12 @@ const CORNER: u32 = 9;
 pub struct Dofs {
     /// For each vertex and component: number of the free unknown, `BORDER + k` or `FIXED`.
     of: Vec<u32>,
-    /// For each unknown of the tail, then of the border: its place among the positions.
+    /// For each unknown of the longest tail, then of the border: its place among the positions.
     tail_positions: Vec<usize>,
     /// Number of free unknowns.
     pub free: usize,
-    /// Of them, how many at the end are condensed to ([`Dofs::condensed_to`]).
-    pub tail: usize,
+    /// Of them, how many at the end can be condensed to, shorter tails first ([`Dofs::condensed_to`]).
+    pub tails: Vec<usize>,
 }
 
 impl Dofs {
@@ -55,31 +55,32 @@ impl Dofs {
                 of[3 * vertex + component] = BORDER + component as u32;
             }
         }
-        Dofs { of, tail_positions: Vec::new(), free: free as usize, tail: 0 }
+        Dofs { of, tail_positions: Vec::new(), free: free as usize, tails: Vec::new() }
     }
 
-    /// The same with the last `tail` free unknowns apart: effects on vertices whose unknowns are all among them are a small problem of their own once the
-    /// others are eliminated (`solve::condensed`).
-    pub fn condensed_to(self, tail: usize) -> Self {
-        let mut tail_positions = vec![usize::MAX; tail + 3];
+    /// The same with the last of the free unknowns apart, as many as one of `tails` (ascending) says: effects on vertices whose unknowns are all among them are a small
+    /// problem of their own once the others are eliminated (`solve::condensed`).
+    pub fn condensed_to(self, tails: Vec<usize>) -> Self {
+        let longest = tails.last().copied().unwrap_or(0);
+        let mut tail_positions = vec![usize::MAX; longest + 3];
         for at in 0..self.of.len() {
-            if let Some(index) = self.index(at / 3, at % 3).and_then(|index| index.checked_sub(self.free - tail)) {
+            if let Some(index) = self.index(at / 3, at % 3).and_then(|index| index.checked_sub(self.free - longest)) {
                 tail_positions[index] = at;
             }
         }
-        Dofs { tail, tail_positions, ..self }
+        Dofs { tails, tail_positions, ..self }
     }
 
-    /// Adds `step` (unknowns of the tail, then of the border) to the positions.
+    /// Adds `step` (unknowns of a tail, then of the border) to the positions.
     pub(crate) fn advance_tail(&self, positions: &mut [f64], step: &[f64]) {
-        for (&at, step) in self.tail_positions.iter().zip(step) {
+        for (&at, step) in self.tail_positions.iter().rev().zip(step.iter().rev()) {
             positions[at] += step;
         }
     }
 
-    /// Number of an unknown of the tail or of the border within the tail; `None` for any other and for what is fixed.
-    pub(crate) fn in_tail(&self, vertex: usize, component: usize) -> Option<usize> {
-        self.index(vertex, component)?.checked_sub(self.free - self.tail)
+    /// Number of an unknown of the last `tail` or of the border within the tail; `None` for any other and for what is fixed.
+    pub(crate) fn in_tail(&self, tail: usize, vertex: usize, component: usize) -> Option<usize> {
+        self.index(vertex, component)?.checked_sub(self.free - tail)
     }
 
     /// Index of a (vertex, component) in a vector of free unknowns followed by the three of the border; `None` if fixed.
@@ -112,8 +113,8 @@ pub struct Pattern {
     pub rows: Vec<u32>,
     /// For each stencil set: destination of the lower-triangle entries of each group's Hessian, row by row.
     destinations: Vec<Vec<u32>>,
-    /// For each stencil set: the groups whose unknowns are all in the tail or the border.
-    tail_groups: Vec<Vec<usize>>,
+    /// For each tail and stencil set: the groups whose unknowns are all in the tail or the border.
+    tail_groups: Vec<Vec<Vec<usize>>>,
 }
 
 impl Pattern {
@@ -172,11 +173,14 @@ impl Pattern {
                 list
             })
             .collect();
-        let in_tail = |&dof: &u32| dof >= BORDER || dof as usize >= free - dofs.tail;
-        let tail_groups = stencils
-            .iter()
-            .map(|set| (0..set.len()).filter(|&group| locals(set, group).iter().all(in_tail)).collect())
-            .collect();
+        let groups_in = |tail: &usize| {
+            let in_tail = |&dof: &u32| dof >= BORDER || dof as usize >= free - tail;
+            let within = |set: &&Stencils| {
+                (0..set.len()).filter(|&group| locals(set, group).iter().all(in_tail)).collect::<Vec<usize>>()
+            };
+            stencils.iter().map(within).collect()
+        };
+        let tail_groups = dofs.tails.iter().map(groups_in).collect();
         Pattern { free, column_starts, rows, destinations, tail_groups }
     }
 
@@ -316,8 +320,11 @@ pub fn hessian(
     values.fill(0.0);
     for_each_active(terms, positions, predicted, scratch, |_, term, local, _, matrix| {
         let n = 3 * term.stencils.group_size;
-        matrix.clear();
         matrix.resize(n * n, 0.0);
+        // What lies above the diagonal is not read.
+        for row in 0..n {
+            matrix[row * n..=row * n + row].fill(0.0);
+        }
         term.effect.add_hessian(local, matrix);
         let per_group = n * (n + 1) / 2;
         let mut destinations = pattern.destinations[term.set][local.group * per_group..][..per_group].iter();

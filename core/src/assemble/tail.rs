@@ -16,16 +16,23 @@ pub(crate) enum Stresses<'a> {
     Predicted(&'a Predicted),
 }
 
-/// The effects on the tail alone: those groups whose unknowns are all in the tail of `dofs` or in the border. Vectors and matrices count the tail's unknowns, then
+/// The effects on a tail alone: those groups whose unknowns are all in it or in the border. Vectors and matrices count the tail's unknowns, then
 /// the border's three.
 #[derive(Clone, Copy)]
 pub(crate) struct Tail<'a> {
     pub terms: &'a [Term<'a>],
     pub dofs: &'a Dofs,
     pub pattern: &'a Pattern,
+    /// Which of the tails of `dofs`.
+    pub which: usize,
 }
 
 impl Tail<'_> {
+    /// Its number of unknowns.
+    pub fn size(&self) -> usize {
+        self.dofs.tails[self.which]
+    }
+
     fn for_each_active(
         &self,
         positions: &[f64],
@@ -39,7 +46,7 @@ impl Tail<'_> {
         for (index, term) in self.terms.iter().enumerate() {
             current.resize(3 * term.stencils.group_size, 0.0);
             let len = term.effect.predicted_len();
-            for &group in &self.pattern.tail_groups[term.set] {
+            for &group in &self.pattern.tail_groups[self.which][term.set] {
                 term.stencils.gather(group, positions, current);
                 let predicted = match stresses {
                     Stresses::None => &none[..len],
@@ -65,7 +72,7 @@ impl Tail<'_> {
 
     /// Their gradient (mN).
     pub fn gradient(&self, positions: &[f64], scratch: &mut Scratch) -> Vec<f64> {
-        let mut out = vec![0.0; self.dofs.tail + 3];
+        let mut out = vec![0.0; self.size() + 3];
         self.for_each_active(positions, Stresses::Current, scratch, |_, term, local, forces, _| {
             let n = term.stencils.group_size;
             forces.clear();
@@ -89,7 +96,7 @@ impl Tail<'_> {
         scratch: &mut Scratch,
         out: &mut [f64],
     ) {
-        let size = self.dofs.tail + 3;
+        let size = self.size() + 3;
         let mut unknowns = Vec::new();
         self.for_each_active(positions, stresses, scratch, |_, term, local, _, matrix| {
             let n = 3 * term.stencils.group_size;
@@ -121,7 +128,7 @@ impl Tail<'_> {
 
     /// Number within the tail of each unknown of a group, component-major; `None` for what is fixed.
     fn unknowns<'b>(&'b self, term: &'b Term, group: usize) -> impl Iterator<Item = Option<usize>> + 'b {
-        let vertices = term.stencils.group(group);
-        (0..3).flat_map(move |k| vertices.iter().map(move |&vertex| self.dofs.in_tail(vertex as usize, k)))
+        let (vertices, tail) = (term.stencils.group(group), self.size());
+        (0..3).flat_map(move |k| vertices.iter().map(move |&vertex| self.dofs.in_tail(tail, vertex as usize, k)))
     }
 }

@@ -39,8 +39,9 @@ impl WallDivision {
     }
 }
 
-/// Rings around the core whose inner surface the needle is expected to touch: numbered last, so that what touches can be solved for on its own.
-const TOUCHED_RINGS: usize = 2;
+/// Rings around the core whose inner surface the needle may touch: numbered last, so that what touches can be solved for on its own. It mostly touches no more than the first
+/// of them, and then what is left to solve is smaller.
+const TOUCHED_RINGS: [usize; 2] = [1, 2];
 
 /// A mesh that could not be made.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -139,21 +140,21 @@ impl WallTopology {
         let mut vertices = Vec::new();
         let mut index = HashMap::new();
         let top = layers.len() * ORDER + usize::from(layers.len() > below);
-        let mut touched = Vec::new();
+        let mut touched = TOUCHED_RINGS.map(|_| Vec::new());
         for point in nested_dissection(&disc) {
             let mut levels = used.remove(&point).unwrap_or_default();
             levels.sort_unstable();
             levels.dedup();
             for level in levels {
-                if level == top && disc.is_within(point, TOUCHED_RINGS) {
-                    touched.push((point, level));
-                } else {
-                    vertices.push((point, level));
-                }
+                let rings = TOUCHED_RINGS.iter().position(|&rings| level == top && disc.is_within(point, rings));
+                rings.map_or(&mut vertices, |rings| &mut touched[rings]).push((point, level));
             }
         }
-        let tail = 3 * touched.len();
-        vertices.append(&mut touched);
+        let mut tails = Vec::new();
+        for within in &touched {
+            tails.push(tails.last().unwrap_or(&0) + 3 * within.len());
+        }
+        vertices.extend(touched.into_iter().rev().flatten());
         index.extend(vertices.iter().enumerate().map(|(vertex, &place)| (place, vertex)));
         let needle = vertices.len();
 
@@ -181,7 +182,7 @@ impl WallTopology {
             }
         }
         let fixed = |vertex: usize, _| vertices[vertex].1 == 0 || disc.is_rim(vertices[vertex].0);
-        let dofs = Dofs::new(needle + 1, 0..needle, fixed, Some(needle)).condensed_to(tail);
+        let dofs = Dofs::new(needle + 1, 0..needle, fixed, Some(needle)).condensed_to(tails);
         let tip = Stencils { group_size: 1, vertices: vec![needle as u32] };
         let mut sets = vec![&elements, &faces, &tip];
         if !interface.is_empty() {

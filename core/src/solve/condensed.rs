@@ -1,7 +1,7 @@
 //! Newton steps that meet the contact as it is: the tissue condensed to the surface that is touched, the contact solved for on it.
 //!
 //! Most of what is not linear in an iteration is the contact: which points touch, and how hard. It acts on few unknowns, the tail of the numbering
-//! ([`Dofs::condensed_to`]). Eliminating all others from the Newton system A Δ = −r leaves, for the tail u and the driven vertex t, the tissue's condensed
+//! ([`Dofs::condensed_to`], the shortest of them that the contact lies in). Eliminating all others from the Newton system A Δ = −r leaves, for the tail u and the driven vertex t, the tissue's condensed
 //! stiffness K = S − C (S the Schur complement of A, which its factor's last rows hold: S = L Lᵀ; C the tail's own Hessian in A) and its condensed
 //! force f. On this small dense system
 //!
@@ -28,8 +28,10 @@ use model::Model;
 /// Relative difference below which the force on the driven vertex is that of the tail alone.
 const SAME: f64 = 1e-9;
 
-/// The tissue condensed to the tail, as of the last factorisation.
+/// The tissue condensed to a tail, as of the last factorisation.
 pub(super) struct Condensed {
+    /// Which tail.
+    which: usize,
     /// Schur complement S of the whole (mN/mm); empty: none is at hand.
     whole: Dense,
     /// Stiffness K of what is not in the tail.
@@ -47,26 +49,35 @@ impl Condensed {
 
 impl Default for Condensed {
     fn default() -> Self {
-        Condensed { whole: Dense::empty(), tissue: Dense::empty(), hessian: Dense::empty() }
+        Condensed { which: 0, whole: Dense::empty(), tissue: Dense::empty(), hessian: Dense::empty() }
     }
 }
 
 impl System<'_> {
-    fn tail(&self) -> Tail<'_> {
-        Tail { terms: self.terms, dofs: self.dofs, pattern: self.pattern }
+    fn tail(&self, which: usize) -> Tail<'_> {
+        Tail { terms: self.terms, dofs: self.dofs, pattern: self.pattern, which }
     }
 
-    /// Condenses the system that was just factorised at `positions` with the stresses `predicted`.
+    /// The gradient of the effects on `tail`, if theirs is all the force on the driven vertex.
+    fn gradient_of_all(&self, tail: Tail, positions: &[f64], workspace: &mut Workspace) -> Option<Vec<f64>> {
+        let gradient = tail.gradient(positions, &mut workspace.scratch);
+        let held = &workspace.residual[self.dofs.free..];
+        let apart = (0..3).any(|k| (held[k] - gradient[tail.size() + k]).abs() > SAME * norm(held));
+        (!apart).then_some(gradient)
+    }
+
+    /// Condenses the system that was just factorised at `positions`, those of the last residual, with the stresses `predicted`.
     pub(super) fn condense(&self, positions: &[f64], predicted: &Predicted, workspace: &mut Workspace) {
-        let size = self.dofs.tail;
-        let Workspace { factor, scratch, condensed, .. } = workspace;
-        if size == 0 {
+        let mut tails = (0..self.dofs.tails.len()).map(|which| self.tail(which));
+        let Some(tail) = tails.find(|tail| self.gradient_of_all(*tail, positions, workspace).is_some()) else {
+            workspace.condensed.forget();
             return;
-        }
-        condensed.whole = factor.tail(self.symbolic, size, 3).times_transposed();
-        condensed.tissue = condensed.whole.clone();
-        let own = Stresses::Predicted(predicted);
-        self.tail().add_hessian(positions, own, -1.0, scratch, condensed.tissue.lower_mut());
+        };
+        let Workspace { factor, scratch, condensed, .. } = workspace;
+        condensed.which = tail.which;
+        condensed.whole = factor.tail(self.symbolic, tail.size(), 3).times_transposed();
+        condensed.tissue.clone_from(&condensed.whole);
+        tail.add_hessian(positions, Stresses::Predicted(predicted), -1.0, scratch, condensed.tissue.lower_mut());
         condensed.tissue.clear_border();
     }
 
@@ -80,18 +91,16 @@ impl System<'_> {
         max_travel_mm: f64,
         workspace: &mut Workspace,
     ) -> Option<Vec<f64>> {
-        let size = self.dofs.tail;
-        let (free, tail) = (self.dofs.free, self.tail());
+        let (free, size) = (self.dofs.free, workspace.condensed.whole.size());
         let first = free - size;
         // What is held at a value ties the tail to all that is below: its multiplier would be one unknown more here.
-        if size == 0 || workspace.condensed.whole.size() != size || !workspace.held.slope.is_empty() {
+        if size == 0 || !workspace.held.slope.is_empty() {
             return None;
         }
-        let gradient = tail.gradient(positions, &mut workspace.scratch);
-        let held = &workspace.residual[free..];
-        let apart = (0..3).any(|k| (held[k] - gradient[size + k]).abs() > SAME * norm(held));
+        let tail = self.tail(workspace.condensed.which);
+        let gradient = self.gradient_of_all(tail, positions, workspace)?;
         let coupling = |k: usize| &workspace.values[self.pattern.stored() + k * free..][..first];
-        if apart || (0..3).any(|k| coupling(k).iter().any(|c| *c != 0.0)) {
+        if (0..3).any(|k| coupling(k).iter().any(|c| *c != 0.0)) {
             return None;
         }
         let start = &newton[first..];
@@ -129,6 +138,7 @@ impl System<'_> {
 
     /// Replaces predicted stresses of the effects on the tail by those at `positions`.
     pub(super) fn keep_tail_stresses(&self, positions: &[f64], predicted: &mut Predicted, workspace: &mut Workspace) {
-        self.tail().keep_stresses(positions, &mut workspace.scratch, predicted);
+        let tail = self.tail(workspace.condensed.which);
+        tail.keep_stresses(positions, &mut workspace.scratch, predicted);
     }
 }
