@@ -66,20 +66,18 @@ impl SolidEnergy for Elasticity<'_> {
     #[inline(always)]
     fn add_hessian_n(&self, local: &Local, out: &mut [f64]) {
         let material = &self.materials[local.group];
-        let mut coefficients = [StiffnessCoefficients::default(); POINTS];
-        let mut volumetric = Volumetric { dilatation_gradient: [[[0.0; NODES]; POINTS]; 3], stiffness: [0.0; POINTS] };
+        let mut gradients = [[[0.0; NODES]; POINTS]; 3];
+        let mut coefficients = StiffnessCoefficients::ZERO;
+        let mut volumetric = Volumetric { dilatation: [1.0; POINTS], stiffness: [0.0; POINTS] };
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
-            for (rows, gradient) in
-                volumetric.dilatation_gradient.iter_mut().zip(self.geometry.gradients(local.group, q))
-            {
+            for (rows, gradient) in gradients.iter_mut().zip(self.geometry.gradients(local.group, q)) {
                 rows[q] = *gradient;
             }
-            let shear = weight * material.mu;
-            coefficients[q] = StiffnessCoefficients { rest: shear, cross: shear, outer: 0.0 };
+            coefficients.rest[q] = weight * material.mu;
+            coefficients.cross[q] = weight * material.mu;
             volumetric.stiffness[q] = weight * material.lambda;
         }
-        let gradients = &volumetric.dilatation_gradient;
-        self.geometry.add_stiffness(local.group, gradients, &coefficients, Some(&volumetric), out);
+        self.geometry.add_stiffness(local.group, &gradients, &coefficients, Some(&volumetric), out);
     }
 }
 

@@ -211,34 +211,24 @@ impl SolidEnergy for FiniteStrain<'_> {
         }
         let material = &self.materials[local.group];
         let mut spatial = [[[0.0; NODES]; POINTS]; 3];
-        let mut coefficients = [StiffnessCoefficients::default(); POINTS];
-        let mut volumetric = Volumetric { dilatation_gradient: [[[0.0; NODES]; POINTS]; 3], stiffness: [0.0; POINTS] };
+        let mut coefficients = StiffnessCoefficients::ZERO;
+        let mut volumetric = Volumetric { dilatation: points.j, stiffness: [0.0; POINTS] };
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
             let rest = self.geometry.gradients(local.group, q);
             push_forward(&points.f_inverse_transposed[q], rest, q, &mut spatial);
             let j = points.j[q];
-            for k in 0..3 {
-                for a in 0..NODES {
-                    volumetric.dilatation_gradient[k][q][a] = j * spatial[k][q][a];
-                }
-            }
             let pj = pressure[q] * j;
-            coefficients[q] = match self.law {
-                NeoHookean::Logarithmic => StiffnessCoefficients {
-                    rest: weight * material.mu,
-                    cross: weight * (material.mu - pj),
-                    outer: weight * pj,
-                },
+            let (rest, cross, outer) = match self.law {
+                NeoHookean::Logarithmic => (material.mu, material.mu - pj, pj),
                 NeoHookean::Isochoric => {
                     let scaled = material.mu * j.powf(-2.0 / 3.0);
                     let i1 = points.f[q].norm_squared();
-                    StiffnessCoefficients {
-                        rest: weight * scaled,
-                        cross: weight * (scaled * i1 / 3.0 - pj),
-                        outer: weight * (scaled * i1 * 2.0 / 9.0 + pj),
-                    }
+                    (scaled, scaled * i1 / 3.0 - pj, scaled * i1 * 2.0 / 9.0 + pj)
                 }
             };
+            coefficients.rest[q] = weight * rest;
+            coefficients.cross[q] = weight * cross;
+            coefficients.outer[q] = weight * outer;
             volumetric.stiffness[q] = weight * self.volumetric(material, points.theta[q]).2;
         }
         self.geometry.add_stiffness(local.group, &spatial, &coefficients, Some(&volumetric), out);

@@ -16,7 +16,7 @@
 
 use nalgebra::Matrix3;
 
-use super::solid::products::add_products;
+use super::solid::products::{Products, add_products};
 use super::solid::{
     Energy, Gradient, Hessian, MaxStep, SolidEnergy, SolidGeometry, StiffnessCoefficients, determinant_and_cofactor,
     push_forward,
@@ -241,13 +241,15 @@ impl SolidEnergy for Viscoelasticity<'_> {
         let Some((_, inverse, _)) = self.points(local) else { return };
         let mut spatial = [[[0.0; NODES]; POINTS]; 3];
         let mut pulled = [[[0.0; NODES]; POINTS]; 3];
-        let mut coefficients = [StiffnessCoefficients::default(); POINTS];
+        let mut coefficients = StiffnessCoefficients::ZERO;
+        let mut scales = [0.0; 3 * POINTS];
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
             let rest = self.geometry.gradients(local.group, q);
             let scale = weight * self.shear_kpa[local.group];
             push_forward(&inverse[q], rest, q, &mut spatial);
-            push_forward(&(self.pull(local.group, q) * scale), rest, q, &mut pulled);
-            coefficients[q].cross = scale * self.barrier;
+            push_forward(self.pull(local.group, q), rest, q, &mut pulled);
+            scales[3 * q..3 * q + 3].fill(scale);
+            coefficients.cross[q] = scale * self.barrier;
         }
         self.geometry.add_stiffness(local.group, &spatial, &coefficients, None, out);
         // In the order of the gradients: all components of a point, then the next.
@@ -256,7 +258,8 @@ impl SolidEnergy for Viscoelasticity<'_> {
             *pulled_row = pulled[row % 3][row / 3];
         }
         let mut isotropic = [[0.0; NODES]; NODES];
-        add_products([(&pulled_rows, self.geometry.gradient_rows(local.group))], &mut isotropic);
+        let right = self.geometry.gradient_rows(local.group);
+        add_products([Products { scales: &scales, left: &pulled_rows, right }], &mut isotropic);
         add_isotropic(&isotropic, out);
     }
 }

@@ -1,71 +1,93 @@
 //! Sums of outer products of rows of one number per node: what element matrices are made of.
 //!
-//! The sum of one block stays in registers, a tile of four rows and up to three vectors at a time, while it runs over the products; the block itself is touched once. Not here: what the rows mean.
+//! The sum of one block stays in registers, a tile of four rows and up to three vectors at a time, while it runs over the products; the block itself is touched once. What the left
+//! rows are scaled by is multiplied in four of their numbers at a time: all of an element's rows, scaled, would not stay in the first cache. Not here: what the rows mean.
 
 use super::LANES;
-use crate::mesh::element::NODES;
+use crate::mesh::element::{NODES, POINTS};
 
 /// One number for each pair of nodes of an element.
 pub(in crate::effects) type NodePairs = [[f64; NODES]; NODES];
 
-/// Rows on the left, and as many on the right.
-pub(in crate::effects) type Pair<'a> = (&'a [[f64; NODES]], &'a [[f64; NODES]]);
+/// Products in one sum at most: a row for each component at each quadrature point.
+const MOST: usize = 3 * POINTS;
 
-/// `scale` × `row`.
-#[inline(always)]
-pub(super) fn scaled_row(scale: f64, row: &[f64; NODES]) -> [f64; NODES] {
-    let mut out = [0.0; NODES];
-    for a in 0..NODES {
-        out[a] = scale * row[a];
-    }
-    out
+/// The sum over k of `scales[k]` `left[k]` ⊗ `right[k]`: as many scales as rows on either side, 3 × [`POINTS`] at most.
+#[derive(Clone, Copy)]
+pub(in crate::effects) struct Products<'a> {
+    pub scales: &'a [f64],
+    pub left: &'a [[f64; NODES]],
+    pub right: &'a [[f64; NODES]],
 }
 
-/// Adds Σₖ left[k][a] right[k][b] of every pair to `block[a][b]`.
+/// Adds `sums`, [`MOST`] products in all at most, to `block`, whose rows are the nodes on the left.
 #[inline(always)]
-pub(in crate::effects) fn add_products<const PAIRS: usize>(pairs: [Pair; PAIRS], block: &mut NodePairs) {
-    for a in (0..NODES).step_by(LANES) {
-        add_tile::<3, PAIRS>([a, 0], &pairs, block);
-        add_tile::<2, PAIRS>([a, 3], &pairs, block);
+pub(in crate::effects) fn add_products<const SUMS: usize>(sums: [Products; SUMS], block: &mut NodePairs) {
+    let mut scaled = [[0.0; LANES]; MOST];
+    for row in (0..NODES).step_by(LANES) {
+        scale_rows(row, &sums, &mut scaled);
+        add_tile::<3, SUMS>([row, 0], &scaled, &sums, block);
+        add_tile::<2, SUMS>([row, 3], &scaled, &sums, block);
     }
 }
 
 /// As [`add_products`], for a sum that is symmetric: what lies above the diagonal by more than a vector is left out.
 #[inline(always)]
-pub(in crate::effects) fn add_symmetric_products<const PAIRS: usize>(pairs: [Pair; PAIRS], block: &mut NodePairs) {
-    add_tile::<1, PAIRS>([0, 0], &pairs, block);
-    add_tile::<2, PAIRS>([4, 0], &pairs, block);
-    add_tile::<3, PAIRS>([8, 0], &pairs, block);
-    add_tile::<2, PAIRS>([12, 0], &pairs, block);
-    add_tile::<2, PAIRS>([12, 2], &pairs, block);
-    add_tile::<3, PAIRS>([16, 0], &pairs, block);
-    add_tile::<2, PAIRS>([16, 3], &pairs, block);
+pub(in crate::effects) fn add_symmetric_products<const SUMS: usize>(sums: [Products; SUMS], block: &mut NodePairs) {
+    let mut scaled = [[0.0; LANES]; MOST];
+    scale_rows(0, &sums, &mut scaled);
+    add_tile::<1, SUMS>([0, 0], &scaled, &sums, block);
+    scale_rows(4, &sums, &mut scaled);
+    add_tile::<2, SUMS>([4, 0], &scaled, &sums, block);
+    scale_rows(8, &sums, &mut scaled);
+    add_tile::<3, SUMS>([8, 0], &scaled, &sums, block);
+    scale_rows(12, &sums, &mut scaled);
+    add_tile::<2, SUMS>([12, 0], &scaled, &sums, block);
+    add_tile::<2, SUMS>([12, 2], &scaled, &sums, block);
+    scale_rows(16, &sums, &mut scaled);
+    add_tile::<3, SUMS>([16, 0], &scaled, &sums, block);
+    add_tile::<2, SUMS>([16, 3], &scaled, &sums, block);
+}
+
+/// Fills `scaled` with four numbers, from `row` on, of each left row of `sums`, one sum after the other.
+#[inline(always)]
+fn scale_rows<const SUMS: usize>(row: usize, sums: &[Products; SUMS], scaled: &mut [[f64; LANES]; MOST]) {
+    let mut scaled = scaled.iter_mut();
+    for sum in sums {
+        for ((left, scale), scaled) in sum.left.iter().zip(sum.scales).zip(&mut scaled) {
+            for lane in 0..LANES {
+                scaled[lane] = scale * left[row + lane];
+            }
+        }
+    }
 }
 
 /// `VECTORS` vectors of each of four rows, from the row and the vector `at`: three of them, what they are multiplied by and one factor are what registers hold.
 #[inline(always)]
-fn add_tile<const VECTORS: usize, const PAIRS: usize>(
+fn add_tile<const VECTORS: usize, const SUMS: usize>(
     [row, vector]: [usize; 2],
-    pairs: &[Pair; PAIRS],
+    scaled: &[[f64; LANES]; MOST],
+    sums: &[Products; SUMS],
     block: &mut NodePairs,
 ) {
-    let mut sum = [[[0.0; LANES]; VECTORS]; LANES];
+    let mut tile = [[[0.0; LANES]; VECTORS]; LANES];
     for r in 0..LANES {
-        sum[r].copy_from_slice(&block[row + r].as_chunks::<LANES>().0[vector..][..VECTORS]);
+        tile[r].copy_from_slice(&block[row + r].as_chunks::<LANES>().0[vector..][..VECTORS]);
     }
-    for (left, right) in pairs {
-        for (left, right) in left.iter().zip(*right) {
+    let mut scaled = scaled.iter();
+    for sum in sums {
+        for (right, scaled) in sum.right.iter().zip(&mut scaled) {
             let right = &right.as_chunks::<LANES>().0[vector..][..VECTORS];
             for r in 0..LANES {
                 for v in 0..VECTORS {
                     for lane in 0..LANES {
-                        sum[r][v][lane] = left[row + r].mul_add(right[v][lane], sum[r][v][lane]);
+                        tile[r][v][lane] = scaled[r].mul_add(right[v][lane], tile[r][v][lane]);
                     }
                 }
             }
         }
     }
     for r in 0..LANES {
-        block[row + r].as_chunks_mut::<LANES>().0[vector..][..VECTORS].copy_from_slice(&sum[r]);
+        block[row + r].as_chunks_mut::<LANES>().0[vector..][..VECTORS].copy_from_slice(&tile[r]);
     }
 }

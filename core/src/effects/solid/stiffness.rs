@@ -4,7 +4,7 @@
 
 use nalgebra::Matrix4;
 
-use super::products::{add_products, add_symmetric_products, scaled_row};
+use super::products::{Products, add_products, add_symmetric_products};
 use super::{LANES, SolidGeometry};
 use crate::effect::LOWER_BLOCKS;
 use crate::mesh::element::{MODES, NODES, POINTS};
@@ -12,23 +12,28 @@ use crate::mesh::element::{MODES, NODES, POINTS};
 /// One number per node for each component at each quadrature point: indexed (component, point, node).
 pub type PointRows = [[[f64; NODES]; POINTS]; 3];
 
-/// The second derivative of an energy of the projected dilatation.
+/// The second derivative of an energy of the projected dilatation θ.
 pub struct Volumetric {
-    /// ∂J/∂x at each point (1/mm).
-    pub dilatation_gradient: PointRows,
+    /// J at each point, or what else of the gradients g makes ∂J/∂x.
+    pub dilatation: [f64; POINTS],
     /// Quadrature weight times U″(θ) at each point (mN·mm).
     pub stiffness: [f64; POINTS],
 }
 
-/// Coefficients of the point-wise stiffness, quadrature weight included (mN·mm).
-#[derive(Clone, Copy, Debug, Default)]
+/// Coefficients of the point-wise stiffness at each point, quadrature weight included (mN·mm).
+#[derive(Clone, Copy, Debug)]
 pub struct StiffnessCoefficients {
-    /// Multiplies δᵢⱼ Gₐ·G_b.
-    pub rest: f64,
-    /// Multiplies gₐⱼ g_bᵢ.
-    pub cross: f64,
-    /// Multiplies gₐᵢ g_bⱼ.
-    pub outer: f64,
+    /// Multiply δᵢⱼ Gₐ·G_b.
+    pub rest: [f64; POINTS],
+    /// Multiply gₐⱼ g_bᵢ.
+    pub cross: [f64; POINTS],
+    /// Multiply gₐᵢ g_bⱼ.
+    pub outer: [f64; POINTS],
+}
+
+impl StiffnessCoefficients {
+    /// No stiffness.
+    pub const ZERO: Self = StiffnessCoefficients { rest: [0.0; POINTS], cross: [0.0; POINTS], outer: [0.0; POINTS] };
 }
 
 impl SolidGeometry {
@@ -41,48 +46,44 @@ impl SolidGeometry {
         &self,
         element: usize,
         spatial: &PointRows,
-        coefficients: &[StiffnessCoefficients; POINTS],
+        coefficients: &StiffnessCoefficients,
         volumetric: Option<&Volumetric>,
         out: &mut [f64],
     ) {
+        let StiffnessCoefficients { rest, cross, outer } = coefficients;
         let mut isotropic = [[0.0; NODES]; NODES];
-        if coefficients.iter().any(|c| c.rest != 0.0) {
-            let rest = self.gradient_rows(element);
-            let mut scaled = [[0.0; NODES]; 3 * POINTS];
-            for (row, (scaled, rest)) in scaled.iter_mut().zip(rest).enumerate() {
-                *scaled = scaled_row(coefficients[row / 3].rest, rest);
+        if rest.iter().any(|c| *c != 0.0) {
+            let gradients = self.gradient_rows(element);
+            let mut scales = [0.0; 3 * POINTS];
+            for (row, scale) in scales.iter_mut().enumerate() {
+                *scale = rest[row / 3];
             }
-            add_symmetric_products([(&scaled, rest)], &mut isotropic);
+            add_symmetric_products([Products { scales: &scales, left: gradients, right: gradients }], &mut isotropic);
         }
-        let scaled_by = |coefficient: fn(&StiffnessCoefficients) -> f64| {
-            let mut out = [[[0.0; NODES]; POINTS]; 3];
-            for k in 0..3 {
-                for q in 0..POINTS {
-                    out[k][q] = scaled_row(coefficient(&coefficients[q]), &spatial[k][q]);
-                }
-            }
-            out
-        };
-        let has_outer = coefficients.iter().any(|c| c.outer != 0.0);
-        let cross = scaled_by(|c| c.cross);
-        let (both, outer) =
-            if has_outer { (scaled_by(|c| c.cross + c.outer), scaled_by(|c| c.outer)) } else { (cross, cross) };
-        let [scaled, integrals] = match volumetric {
-            Some(volumetric) => self.dilatation_modes(element, volumetric),
+        let mut both = [0.0; POINTS];
+        for q in 0..POINTS {
+            both[q] = cross[q] + outer[q];
+        }
+        let outers = if outer.iter().any(|c| *c != 0.0) { POINTS } else { 0 };
+        let [weighted, integrals] = match volumetric {
+            Some(volumetric) => self.dilatation_modes(element, spatial, volumetric),
             None => [[[[0.0; NODES]; MODES]; 3]; 2],
         };
         let modes = if volumetric.is_some() { MODES } else { 0 };
-        let outers = if has_outer { POINTS } else { 0 };
         let rows = out.as_chunks_mut::<NODES>().0;
         for &(i, j) in &LOWER_BLOCKS {
-            let of_modes = (&scaled[i][..modes], &integrals[j][..modes]);
+            let of_modes =
+                Products { scales: &[1.0; MODES][..modes], left: &weighted[i][..modes], right: &integrals[j][..modes] };
             let mut block = [[0.0; NODES]; NODES];
             if i == j {
                 block = isotropic;
-                add_symmetric_products([(&both[i], &spatial[i]), of_modes], &mut block);
+                let of_points = Products { scales: &both, left: &spatial[i], right: &spatial[i] };
+                add_symmetric_products([of_points, of_modes], &mut block);
             } else {
-                let of_outer = (&outer[i][..outers], &spatial[j][..outers]);
-                add_products([(&cross[j], &spatial[i]), of_outer, of_modes], &mut block);
+                let of_cross = Products { scales: cross, left: &spatial[j], right: &spatial[i] };
+                let of_outer =
+                    Products { scales: &outer[..outers], left: &spatial[i][..outers], right: &spatial[j][..outers] };
+                add_products([of_cross, of_outer, of_modes], &mut block);
             }
             for (a, block) in block.iter().enumerate() {
                 let row = &mut rows[(i * NODES + a) * 3 + j];
@@ -96,7 +97,12 @@ impl SolidGeometry {
     /// The gradients of the dilatation's pressure modes (component, mode), M⁻¹ C M⁻¹ times them and as they are: the volumetric stiffness is the sum of their outer
     /// products, with C the stiffness w U″ between modes.
     #[inline(always)]
-    fn dilatation_modes(&self, element: usize, volumetric: &Volumetric) -> [[[[f64; NODES]; MODES]; 3]; 2] {
+    fn dilatation_modes(
+        &self,
+        element: usize,
+        spatial: &PointRows,
+        volumetric: &Volumetric,
+    ) -> [[[[f64; NODES]; MODES]; 3]; 2] {
         let mut core = Matrix4::zeros();
         for (stiffness, modes) in volumetric.stiffness.iter().zip(&self.mode_values) {
             for m in 0..MODES {
@@ -109,7 +115,7 @@ impl SolidGeometry {
         let mut scales = [[0.0; MODES]; POINTS];
         for (q, weight) in self.weights(element).iter().enumerate() {
             for m in 0..MODES {
-                scales[q][m] = weight * self.mode_values[q][m];
+                scales[q][m] = weight * volumetric.dilatation[q] * self.mode_values[q][m];
             }
         }
         let (mut integrals, mut scaled) = ([[[0.0; NODES]; MODES]; 3], [[[0.0; NODES]; MODES]; 3]);
@@ -117,7 +123,7 @@ impl SolidGeometry {
             for chunk in 0..NODES / LANES {
                 let mut sum = [[0.0; LANES]; MODES];
                 for q in 0..POINTS {
-                    let gradient = &volumetric.dilatation_gradient[k][q].as_chunks::<LANES>().0[chunk];
+                    let gradient = &spatial[k][q].as_chunks::<LANES>().0[chunk];
                     for m in 0..MODES {
                         for lane in 0..LANES {
                             sum[m][lane] = scales[q][m].mul_add(gradient[lane], sum[m][lane]);
