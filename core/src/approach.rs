@@ -24,6 +24,8 @@ pub struct Touch {
 const MAX_ITERATIONS: usize = 40;
 /// Iterations of the ray against the surface.
 const RAY_ITERATIONS: usize = 30;
+/// Share of the way to the next touch point that a tip with an edge goes: it jumps from rim to rim otherwise.
+const EDGED_SHARE: f64 = 0.5;
 /// Change of the touch point below which it is settled (mm).
 const SETTLED_MM: f64 = 1e-7;
 /// Steepest direction against the surface normal for which a ray is followed (cosine of 89°).
@@ -39,14 +41,14 @@ pub fn first_touch(
 ) -> Option<Touch> {
     let mut parameter = [patch_from_needle.translation.x, patch_from_needle.translation.y];
     let mut touch = None;
+    let share = if body.is_round() { 1.0 } else { EDGED_SHARE };
     for _ in 0..MAX_ITERATIONS {
         let inward = -surface.normal(parameter[0], parameter[1]);
         let inward_in_needle = patch_from_needle.inverse_transform_unit_vector(&inward);
         let foremost = patch_from_needle * body.foremost_along(&inward_in_needle)?;
         let (travel_mm, hit) = follow_ray(surface, &foremost, direction)?;
         let moved = (hit[0] - parameter[0]).hypot(hit[1] - parameter[1]);
-        // Half of the way: flat tips jump from rim to rim otherwise.
-        parameter = [0, 1].map(|k| 0.5 * (parameter[k] + hit[k]));
+        parameter = [0, 1].map(|k| parameter[k] + share * (hit[k] - parameter[k]));
         touch = Some(Touch { travel_mm, parameter: hit, inward });
         if moved < SETTLED_MM {
             break;

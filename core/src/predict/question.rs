@@ -168,8 +168,17 @@ impl Question<'_> {
 
     /// What the eye's pressure does by itself.
     pub(crate) fn sink_without_fluid(&self) -> Sink {
-        let Scene { tissue, .. } = &self.prepared.scene;
         let change_kpa = self.prepared.scene.pressure_change_kpa();
+        let sink_mm = if change_kpa == 0.0 { 0.0 } else { self.deepest_sink_mm(change_kpa) };
+        let report = pressure::report(&self.request.effects, change_kpa, sink_mm * 1e3);
+        let simulated = report.simulated;
+        let expected_mm = if simulated { sink_mm.abs() } else { 0.0 };
+        Sink { report, change_kpa: simulated.then_some(change_kpa), bleb: None, expected_mm }
+    }
+
+    /// How far that node of the patch sinks under a change of pressure that sinks most, by linear or by neo-Hookean elasticity, whichever is more (mm).
+    fn deepest_sink_mm(&self, change_kpa: f64) -> f64 {
+        let tissue = &self.prepared.scene.tissue;
         let laws =
             [Solid::Elasticity, Solid::FiniteStrain].map(|solid| Settled::new(tissue, change_kpa, solid, |_| true));
         let surface = &self.patch().surface;
@@ -179,11 +188,7 @@ impl Question<'_> {
             sinks.fold(0.0, |deepest: f64, sink| if sink.abs() > deepest.abs() { sink } else { deepest })
         };
         let [linear, finite] = laws.each_ref().map(deepest);
-        let sink_mm = if finite.abs() > linear.abs() { finite } else { linear };
-        let report = pressure::report(&self.request.effects, change_kpa, sink_mm * 1e3);
-        let simulated = report.simulated;
-        let expected_mm = if simulated { sink_mm.abs() } else { 0.0 };
-        Sink { report, change_kpa: simulated.then_some(change_kpa), bleb: None, expected_mm }
+        if finite.abs() > linear.abs() { finite } else { linear }
     }
 
     pub(crate) fn decide(&self, expected: Expected, sink: &Sink) -> Result<Decision, PredictError> {
