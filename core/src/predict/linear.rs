@@ -198,17 +198,19 @@ impl<'a> LinearAnswer<'a> {
             center: press.touch.parameter,
             pressed: Vec::new(),
         };
-        for (bed, weight) in beds.around(thinning)? {
+        let beds = beds.around(thinning)?;
+        // All beds sample a profile at the same radii.
+        let radii_mm = beds.first().map_or(&[][..], |(bed, _)| bed.linear.sample_radii_mm());
+        let heights = match support {
+            Support::Edge(_) => tool.body.underside_by_area(inward, radii_mm),
+            Support::Ball(about) | Support::Face(about) => tool.body.underside_profile(inward, about, radii_mm),
+        }
+        .ok_or_else(shaft_first)?;
+        // The bed counts its depth from the profile's lowest point, this answer from the needle's.
+        let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
+        let profile = RigidProfile { heights_mm: &heights, edge: None };
+        for (bed, weight) in beds {
             let linear = &bed.linear;
-            let radii_mm = linear.sample_radii_mm();
-            let heights = match support {
-                Support::Edge(_) => tool.body.underside_by_area(inward, radii_mm),
-                Support::Ball(about) | Support::Face(about) => tool.body.underside_profile(inward, about, radii_mm),
-            }
-            .ok_or_else(shaft_first)?;
-            // The bed counts its depth from the profile's lowest point, this answer from the needle's.
-            let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
-            let profile = RigidProfile { heights_mm: &heights, edge: None };
             let indentation: Indentation = match press.load {
                 Load::Force(force) => linear.indent_by_force(&profile, force),
                 Load::Depth(depth) => linear.indent_by_depth(&profile, (depth - lowest).max(0.0)),
