@@ -165,6 +165,26 @@ pub fn at_time(mut pose: Vec<u8>, time_s: f64) -> Vec<u8> {
     pose
 }
 
+/// The same pose with this volume of fluid (mm³), or this pressure of it (kPa), in a session with memory.
+pub fn with_fluid(mut pose: Vec<u8>, fluid: Fluid) -> Vec<u8> {
+    let (flag, number) = match fluid {
+        Fluid::VolumeMm3(number) => (8, number),
+        Fluid::PressureKpa(number) => (16, number),
+    };
+    pose[6] |= flag;
+    pose.extend(number.to_le_bytes());
+    pose
+}
+
+/// How much fluid there is.
+#[derive(Clone, Copy, Debug)]
+pub enum Fluid {
+    /// Its volume.
+    VolumeMm3(f64),
+    /// Its pressure above that in the eye.
+    PressureKpa(f64),
+}
+
 /// The same pose of a needle that is where the last pose left it.
 pub fn where_it_is(mut pose: Vec<u8>) -> Vec<u8> {
     pose[6] |= 4;

@@ -14,7 +14,8 @@
 //! | 16 | f64 | the client's time, repeated by the answer |
 //!
 //! A pose, 64 bytes in all; flag 1: `force_mn` is given (else the needle is held and these three are 0). In a session with memory, flag 4: tip and orientation are left
-//! out, so the needle is where the last pose left it (these seven are 0), and flag 2: the pose has a time, which makes it 72 bytes:
+//! out, so the needle is where the last pose left it (these seven are 0), flag 2: the pose has a time, and flag 8 or flag 16: it says how much fluid is on the scene's detached
+//! disc. Each of the two adds 8 bytes, the time first:
 //!
 //! | offset | type | what |
 //! |---|---|---|
@@ -22,6 +23,7 @@
 //! | 36 | 4 × f32 | `orientation_xyzw` |
 //! | 52 | 3 × f32 | `force_mn` |
 //! | 64 | f64 | with flag 2: `time_s` |
+//! | 64 or 72 | f64 | with flag 8: the fluid's `volume_mm3`; with flag 16: its `pressure_kpa` |
 //!
 //! An answer with `n` nodes, 116 + 28 `n` bytes; flag 1: the expected error was measured on requests like this one, flag 2: there are warnings
 //! (a session in `json` has their words), flag 4: the patch is cut from a mesh and brings its triangles:
@@ -59,6 +61,7 @@ use serde_json::json;
 
 use crate::problem::{Kind, Problem};
 use crate::wire::fixed::{Quaternion, Vector};
+use crate::wire::scene::FillingSpec;
 use crate::wire::stream::{StreamPose, StreamTimes};
 
 /// Version of the layout.
@@ -68,12 +71,14 @@ const MAGIC: [u8; 4] = *b"RTNA";
 const POSE: u8 = 1;
 const ANSWER: u8 = 2;
 const POSE_BYTES: usize = 64;
-const TIME_BYTES: usize = 8;
+const NUMBER_BYTES: usize = 8;
 const ANSWER_BYTES: usize = 116;
 const BYTES_PER_NODE: usize = 28;
 const FORCE_GIVEN: u16 = 1;
 const TIME_GIVEN: u16 = 2;
 const NEEDLE_STAYS: u16 = 4;
+const VOLUME_GIVEN: u16 = 8;
+const PRESSURE_GIVEN: u16 = 16;
 const CALIBRATED: u16 = 1;
 const WARNED: u16 = 2;
 const CUT: u16 = 4;
@@ -106,7 +111,9 @@ fn refused(what: &str, given: impl Into<serde_json::Value>, allowed: impl Into<S
 /// [`Kind::InvalidRequest`] naming the part of the layout that is not kept.
 pub fn pose(bytes: &[u8]) -> Result<StreamPose, Problem> {
     let lengths = || {
-        let allowed = format!("{POSE_BYTES} bytes, {TIME_BYTES} more with a time (flag {TIME_GIVEN})");
+        let allowed = format!(
+            "{POSE_BYTES} bytes, {NUMBER_BYTES} more with a time (flag {TIME_GIVEN}) and with fluid (flag {VOLUME_GIVEN} or {PRESSURE_GIVEN})"
+        );
         refused("length", bytes.len(), allowed)
     };
     let (message, rest) = bytes.split_first_chunk::<POSE_BYTES>().ok_or_else(lengths)?;
@@ -120,15 +127,19 @@ pub fn pose(bytes: &[u8]) -> Result<StreamPose, Problem> {
         return Err(refused("kind", message[5], format!("{POSE} (a pose)")));
     }
     let flags = u16::from_le_bytes(part(message, 6));
-    let all = FORCE_GIVEN | TIME_GIVEN | NEEDLE_STAYS;
-    if flags & !all != 0 {
-        return Err(refused("flags", flags, format!("0 to {all}")));
+    let all = FORCE_GIVEN | TIME_GIVEN | NEEDLE_STAYS | VOLUME_GIVEN | PRESSURE_GIVEN;
+    let fluid = flags & (VOLUME_GIVEN | PRESSURE_GIVEN);
+    if flags & !all != 0 || fluid == VOLUME_GIVEN | PRESSURE_GIVEN {
+        return Err(refused("flags", flags, format!("0 to {all}, of {VOLUME_GIVEN} and {PRESSURE_GIVEN} one at most")));
     }
-    let time_s = match (flags & TIME_GIVEN != 0, rest) {
-        (false, []) => None,
-        (true, rest) => Some(f64::from_le_bytes(rest.try_into().map_err(|_| lengths())?)),
-        (false, _) => return Err(lengths()),
-    };
+    let (numbers, []) = rest.as_chunks::<NUMBER_BYTES>() else { return Err(lengths()) };
+    let mut numbers = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes));
+    let mut next = |given: bool| given.then(|| numbers.next().ok_or_else(lengths)).transpose();
+    let time_s = next(flags & TIME_GIVEN != 0)?;
+    let filling = next(fluid != 0)?;
+    if numbers.next().is_some() {
+        return Err(lengths());
+    }
     let given = flags & NEEDLE_STAYS == 0;
     let number = |at: usize| f64::from(f32::from_le_bytes(part(message, at)));
     let vector = |at: usize| [number(at), number(at + 4), number(at + 8)];
@@ -142,7 +153,10 @@ pub fn pose(bytes: &[u8]) -> Result<StreamPose, Problem> {
         orientation_xyzw: given.then(|| Quaternion([x, y, z, number(48)])),
         direction: None,
         force_mn: (flags & FORCE_GIVEN != 0).then(|| Vector(vector(52))),
-        bleb: None,
+        bleb: filling.map(|filling| FillingSpec {
+            volume_mm3: (fluid == VOLUME_GIVEN).then_some(filling),
+            pressure_kpa: (fluid == PRESSURE_GIVEN).then_some(filling),
+        }),
     };
     let finite = |name: &str, numbers: &[f64]| match numbers.iter().find(|number| !number.is_finite()) {
         Some(number) => Err(refused(name, number.to_string(), "finite numbers")),
@@ -150,6 +164,7 @@ pub fn pose(bytes: &[u8]) -> Result<StreamPose, Problem> {
     };
     finite("client_time_us", &[time_us])?;
     finite("time_s", &[time_s.unwrap_or_default()])?;
+    finite("bleb", &[filling.unwrap_or_default()])?;
     finite("tip_mm", &vector(24))?;
     finite("orientation_xyzw", &[x, y, z, number(48)])?;
     finite("force_mn", &vector(52))?;

@@ -103,8 +103,7 @@ pub struct StreamPose {
     /// Force along which the needle advances until the tissue's reaction along it equals it, scene frame, mN. Left out: the needle stays
     /// where it is, and the reaction is the answer.
     pub force_mn: Option<Vector>,
-    /// In a session with memory: fluid that is on the detached disc of the scene's `bleb` now; as much as at the last pose when left out. Not in a session without memory, nor in a
-    /// binary pose.
+    /// In a session with memory: fluid that is on the detached disc of the scene's `bleb` now; as much as at the last pose when left out. Not in a session without memory.
     #[serde(default, deserialize_with = "object::optional")]
     pub bleb: Option<FillingSpec>,
 }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use retina_tests::stream_client::{Received, StreamClient, at_time, encode_pose, where_it_is};
+use retina_tests::stream_client::{Fluid, Received, StreamClient, at_time, encode_pose, where_it_is, with_fluid};
 use serde_json::{Value, json};
 
 use super::{binary, text, with_client};
@@ -187,6 +187,33 @@ fn what_makes_no_sense_is_a_problem_and_changes_nothing() {
     });
 }
 
+/// What 32-bit numbers of poses and answers leave of a step's displacements (µm).
+const BINARY_UM: f64 = 1e-2;
+
+/// The binary pose of a step whose needle points down.
+fn in_bytes(sequence: u64, step: &Value) -> Vec<u8> {
+    let vector = |part: &str| -> Option<[f32; 3]> {
+        let numbers: Vec<f32> = step.get(part)?.as_array()?.iter().filter_map(|n| Some(n.as_f64()? as f32)).collect();
+        numbers.try_into().ok()
+    };
+    let tip_mm = vector("tip_mm");
+    let pose = encode_pose(
+        sequence,
+        0.0,
+        tip_mm.unwrap_or_default(),
+        tip_mm.map_or([0.0; 4], |_| [0.0, 0.0, 0.0, 1.0]),
+        vector("force_mn"),
+    );
+    let pose = if tip_mm.is_some() { pose } else { where_it_is(pose) };
+    let pose = at_time(pose, step["time_s"].as_f64().expect("time"));
+    let bleb = &step["bleb"];
+    match (bleb["volume_mm3"].as_f64(), bleb["pressure_kpa"].as_f64()) {
+        (Some(volume_mm3), _) => with_fluid(pose, Fluid::VolumeMm3(volume_mm3)),
+        (_, Some(pressure_kpa)) => with_fluid(pose, Fluid::PressureKpa(pressure_kpa)),
+        _ => pose,
+    }
+}
+
 #[test]
 fn fluid_comes_and_goes_in_a_stream_as_in_a_simulation() {
     with_client(&["--threads", "2"], async |service, mut client| {
@@ -211,6 +238,16 @@ fn fluid_comes_and_goes_in_a_stream_as_in_a_simulation() {
         let wet = json!({"pose": {"sequence": 1, "tip_mm": [0.0, 0.0, 0.0], "bleb": {"volume_mm3": 0.02}}});
         let reply = ask(&mut client, &wet).await["problem"]["problem"].take();
         assert_eq!(reply["errors"][0]["field"], "pose.bleb", "{reply}");
+        client.open(with(session, "/format", json!("binary"))).await.expect("session");
+        for (sequence, (step, listed)) in (1..).zip(rehearsal.iter().zip(&listed)) {
+            client.send_bytes(in_bytes(sequence, step)).await.expect("sent");
+            let answer = binary(client.receive().await);
+            let listed_um = listed["surface"]["displacement_um"].as_array().expect("list");
+            for (told_um, listed_um) in answer.displacement_um.iter().zip(listed_um) {
+                let listed_um = listed_um.as_f64().expect("number");
+                assert!((f64::from(*told_um) - listed_um).abs() < BINARY_UM, "{sequence}: {told_um}, {listed_um} µm");
+            }
+        }
     });
 }
 

@@ -1,6 +1,6 @@
 //! What is wrong is said by name, and the stream goes on.
 
-use retina_tests::stream_client::{Received, at_time, encode_pose, where_it_is};
+use retina_tests::stream_client::{Fluid, Received, at_time, encode_pose, where_it_is, with_fluid};
 use serde_json::{Value, json};
 
 use super::{level, pose, text, with_client};
@@ -69,7 +69,11 @@ fn binary_messages_that_do_not_keep_the_layout() {
             (changed(0, b'X'), "pose.magic"),
             (changed(4, 2), "pose.version"),
             (changed(5, 2), "pose.kind"),
-            (changed(6, 9), "pose.flags"),
+            (changed(6, 33), "pose.flags"),
+            (changed(6, 25), "pose.flags"),
+            (changed(6, 9), "pose.length"),
+            (with_fluid(at_time(good(), 1.0), Fluid::VolumeMm3(0.1))[..79].to_vec(), "pose.length"),
+            (with_fluid(good(), Fluid::PressureKpa(f64::NAN)), "pose.bleb"),
             (changed(6, 3), "pose.length"),
             ([good(), vec![0; 8]].concat(), "pose.length"),
             (at_time(good(), 1.0)[..71].to_vec(), "pose.length"),
@@ -79,15 +83,19 @@ fn binary_messages_that_do_not_keep_the_layout() {
             (changed(51, 0), "pose.orientation_xyzw"),
             (at_time(encode_pose(2, 0.0, [0.0; 3], [0.0, 0.0, 0.0, 1.0], None), 1.0), "pose.time_s"),
             (where_it_is(encode_pose(3, 0.0, [0.0; 3], [0.0; 4], None)), "pose.tip_mm"),
+            (
+                with_fluid(encode_pose(4, 0.0, [0.0; 3], [0.0, 0.0, 0.0, 1.0], None), Fluid::PressureKpa(0.1)),
+                "pose.bleb",
+            ),
         ];
         for (bytes, field) in cases {
             client.send_bytes(bytes).await.expect("sent");
             let reply = text(client.receive().await);
             assert_eq!(reply["problem"]["problem"]["errors"][0]["field"], field, "{reply}");
         }
-        let next = encode_pose(4, 0.0, [0.1, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], Some([0.0, 0.0, -0.4]));
+        let next = encode_pose(5, 0.0, [0.1, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], Some([0.0, 0.0, -0.4]));
         client.send_bytes(next).await.expect("sent");
-        assert!(matches!(client.receive().await, Received::Answer(answer) if answer.sequence == 4));
+        assert!(matches!(client.receive().await, Received::Answer(answer) if answer.sequence == 5));
     });
 }
 

@@ -9,7 +9,7 @@ from typing import List, Optional, Sequence, Tuple
 _HEADER = struct.Struct("<4sBBHQd")
 _POSE = struct.Struct("<3f4f3f")
 _ANSWER = struct.Struct("<IBBHdff3ff3fffffffIdI")
-_FORCE_GIVEN, _TIME_GIVEN, _NEEDLE_STAYS = 1, 2, 4
+_FORCE_GIVEN, _TIME_GIVEN, _NEEDLE_STAYS, _VOLUME_GIVEN, _PRESSURE_GIVEN = 1, 2, 4, 8, 16
 _LEVELS = ("linear", "coarse", "reference", "network", "corrected")
 _CONTACTS = ("clear", "touching", "slipping", "punctured")
 
@@ -51,15 +51,18 @@ def write_pose(
     orientation_xyzw: Sequence[float],
     force_mn: Optional[Sequence[float]],
     time_s: Optional[float],
+    volume_mm3: Optional[float],
+    pressure_kpa: Optional[float],
 ) -> bytes:
-    """The binary message of a pose."""
+    """The binary message of a pose; of the fluid's volume and pressure one at most."""
     flags = (0 if force_mn is None else _FORCE_GIVEN) | (0 if time_s is None else _TIME_GIVEN)
     flags |= _NEEDLE_STAYS if tip_mm is None else 0
+    flags |= (0 if volume_mm3 is None else _VOLUME_GIVEN) | (0 if pressure_kpa is None else _PRESSURE_GIVEN)
     tip, turned = ((0.0,) * 3, (0.0,) * 4) if tip_mm is None else (tip_mm, orientation_xyzw)
     force = (0.0,) * 3 if force_mn is None else force_mn
     header = _HEADER.pack(b"RTNA", 1, 1, flags, sequence, client_time_us)
-    time = b"" if time_s is None else struct.pack("<d", time_s)
-    return header + _POSE.pack(*tip, *turned, *force) + time
+    numbers = [number for number in (time_s, volume_mm3, pressure_kpa) if number is not None]
+    return header + _POSE.pack(*tip, *turned, *force) + struct.pack(f"<{len(numbers)}d", *numbers)
 
 
 def read_surface(message: bytes) -> Surface:

@@ -56,14 +56,19 @@ class Stream:
         orientation_xyzw: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
         client_time_us: float = 0.0,
         time_s: Optional[float] = None,
+        volume_mm3: Optional[float] = None,
+        pressure_kpa: Optional[float] = None,
     ) -> int:
         """Sends a pose and returns its number. Without a force the needle is held where it is.
 
-        In a session with memory a pose has a time (the server's clock where it is left out), and without a tip the needle is
-        where the last pose left it.
+        In a session with memory a pose has a time (the server's clock where it is left out), without a tip the needle is
+        where the last pose left it, and the fluid on the scene's detached disc has the volume or the pressure given (as
+        before where both are left out).
         """
         self._sequence += 1
-        pose = write_pose(self._sequence, client_time_us, tip_mm, orientation_xyzw, force_mn, time_s)
+        pose = write_pose(
+            self._sequence, client_time_us, tip_mm, orientation_xyzw, force_mn, time_s, volume_mm3, pressure_kpa
+        )
         self._frame(_BINARY, pose)
         return self._sequence
 
