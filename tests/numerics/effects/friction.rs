@@ -7,7 +7,8 @@ use retina_core::effects::friction::{CoupledFriction, Friction, RubbingPoint, an
 use retina_core::mesh::element::FACE_NODES;
 use retina_tests::tolerance::ROUNDOFF;
 
-use super::{Case, RADIUS, REPEATS, SIZES, STEP, added, check_effect, face, for_each_contact, shapes};
+use super::contact::{for_each_contact, shapes};
+use super::{Case, RADIUS, REPEATS, SIZES, STEP, added, check_effect, face};
 use crate::meshes::noise;
 
 /// Slip from which on friction is at its limit, in needle radii.
