@@ -96,9 +96,7 @@ impl Question<'_> {
             pull: Pull {
                 normal_force_mn: linear.normal_force_mn,
                 tangential_share: still.sliding.coefficient.min(linear.press.tangent()),
-                // As if retina and choroid were squeezed alike.
-                depth_mm: (still.pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm)
-                    * (1.0 - linear.depth_mm / self.yielding_under(&linear.press)),
+                depth_mm: still.pull.depth_mm - self.patch().surface.column(x, y).retina_thinning_mm,
                 ..still.pull
             },
             bending: self.bending(Some(linear)),

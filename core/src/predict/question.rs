@@ -248,7 +248,7 @@ impl Question<'_> {
     }
 
     /// The same where the needle touches: a pit thins the retina (mm).
-    pub(super) fn yielding_under(&self, press: &Press) -> f64 {
+    fn yielding_under(&self, press: &Press) -> f64 {
         let [x, y] = press.touch.parameter;
         self.yielding_mm() - self.patch().surface.column(x, y).retina_thinning_mm
     }

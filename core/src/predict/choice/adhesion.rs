@@ -4,8 +4,6 @@
 //! 0.137 N/h² (τ = 3 N r h² / (2 π (r² + h²)^(5/2)) at r = h/2), and presses it together everywhere. A layered bed and a contact of some width change that by less than the factor of two
 //! between the threshold and the strength. Below the strength the bond is intact, and an intact bond moves nothing.
 //!
-//! The depth is that under the tip where it ends up: what it presses together shears under it as thinner tissue does.
-//!
 //! Friction adds the shear of a force T along the surface, at most 0.089 T/h² at that depth (Cerruti: τ = 3 T x² h / (2 π (x² + h²)^(5/2)) at x² = ⅔ h²), T being no more than µ N and
 //! no more than the motion's part along the surface asks for.
 //!
@@ -30,7 +28,7 @@ pub struct Pull {
     pub normal_force_mn: f64,
     /// Force along the surface over the normal one, at most.
     pub tangential_share: f64,
-    /// Depth of the bond under the contact, pressed (mm).
+    /// Depth of the bond under the contact (mm).
     pub depth_mm: f64,
     /// Fall of the eye's pressure (kPa), where it is simulated; 0 for a rise.
     pub suction_kpa: f64,
