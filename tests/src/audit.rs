@@ -36,6 +36,8 @@ pub struct Compared {
     pub milliseconds: [f64; 2],
     /// Newton iterations of each.
     pub iterations: [usize; 2],
+    /// Largest share of its strength that the retina's bond has lost by `all`, where it can part: a bond that has lost none moves nothing.
+    pub bond_damage: Option<f64>,
     /// Each effect that `auto` left out and `all` simulated.
     pub left_out: Vec<LeftOut>,
     /// Each effect that both simulated.
@@ -150,6 +152,7 @@ pub fn compare(scene: &PreparedScene, request: &Request, workspaces: &mut [Works
         moved_um: all.displacement_um.iter().copied().fold(0.0, f64::max),
         milliseconds,
         iterations: [auto.solver.iterations, all.solver.iterations],
+        bond_damage: all.contact.bond_damage,
         left_out,
         taken: in_auto.iter().filter(|name| in_all.contains(*name)).map(|name| (*name).to_owned()).collect(),
     })

@@ -26,7 +26,7 @@ pub const REFERENCE_ERROR_UM: f64 = 0.5;
 /// See [`REFERENCE_ERROR_UM`]; both are what the `refinement` program holds every scene and gauge against.
 pub const REFERENCE_SHARE: f64 = 0.01;
 
-/// Quantiles of the worst node's error over the linear depth, in one bin.
+/// Quantiles of an error in one bin, in what the table that they stand in counts by: the linear depth, or what refining a mesh may change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantiles {
     /// Half of the samples are below.

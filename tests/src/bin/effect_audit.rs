@@ -207,7 +207,7 @@ fn without(text: &mut String, audited: &BTreeMap<u64, Audited>, compared: &[(&u6
     }
     let mut worst: Vec<&(&u64, &Audited, &Compared)> = compared.iter().collect();
     worst.sort_by(|a, b| b.2.worst_um.total_cmp(&a.2.worst_um));
-    text.push_str("\n## Furthest off\n\n| scene | classes | worst node µm | largest displacement µm | left out, what each moves µm, and its number over its threshold |\n|---|---|---|---|---|\n");
+    text.push_str("\n## Furthest off\n\n| scene | classes | worst node µm | largest displacement µm | left out, what each moves µm, and its number over its threshold | damage of the bond by `all` |\n|---|---|---|---|---|---|\n");
     for (index, one, found) in worst.iter().take(10) {
         let left: Vec<String> = found
             .left_out
@@ -219,11 +219,12 @@ fn without(text: &mut String, audited: &BTreeMap<u64, Audited>, compared: &[(&u6
             .collect();
         let _ = writeln!(
             text,
-            "| {index} | {} | {:.2} | {:.1} | {} |",
+            "| {index} | {} | {:.2} | {:.1} | {} | {} |",
             one.classes.join(", "),
             found.worst_um,
             found.moved_um,
-            left.join(", ")
+            left.join(", "),
+            found.bond_damage.map_or("–".to_owned(), |damage| format!("{damage:.2}"))
         );
     }
 }
