@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use retina_core::assemble::{Dofs, Pattern, Predicted, Scratch, gradient, hessian};
 use retina_core::effect::{Effect, Local, Stencils, Term};
 use retina_core::mesh::disc::{DiscGeometry, DiscTopology};
-use retina_core::mesh::element::{NODE_OFFSETS, QUADRATURE, gauss_rule, shapes};
+use retina_core::mesh::element::{NODE_OFFSETS, QUADRATURE, TOP_NODES, face_shapes, gauss_rule, shapes};
 use retina_core::mesh::ordering::nested_dissection;
 use retina_core::mesh::sample::SurfaceLocator;
 use retina_core::mesh::wall::{LayerThickness, WallDivision, WallGeometry, WallTopology};
@@ -43,6 +43,21 @@ fn gauss_rules_are_exact_to_twice_their_points_less_one() {
             let error = (sum - exact).abs();
             let within = degree < 2 * points as i32;
             assert!(if within { error < ROUNDOFF } else { error > 1e-4 }, "{points} points, degree {degree}: {error}");
+        }
+    }
+}
+
+#[test]
+fn shapes_of_a_face_are_those_of_its_element() {
+    let mut random = noise(43);
+    for _ in 0..50 {
+        let [xi, eta] = [random(), random()];
+        let (of_face, of_element) = (face_shapes([xi, eta]), shapes([xi, eta, 1.0]));
+        for (face, element) in of_face.iter().zip(TOP_NODES.map(|node| of_element[node])) {
+            assert!((face.value - element.value).abs() < ROUNDOFF, "({xi}, {eta}): {face:?}, {element:?}");
+            for k in 0..2 {
+                assert!((face.gradient[k] - element.gradient[k]).abs() < ROUNDOFF, "({xi}, {eta}): {face:?}");
+            }
         }
     }
 }

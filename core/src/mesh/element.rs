@@ -103,9 +103,34 @@ pub fn shapes(at: [f64; 3]) -> [Shape; NODES] {
     out
 }
 
-/// Those of the nodes of the face ζ = 1 at its point `at`, in the order of [`TOP_NODES`].
-pub fn face_shapes(at: [f64; 2]) -> [Shape; FACE_NODES] {
-    TOP_NODES.map(|node| serendipity([at[0], at[1], 1.0], NODE_OFFSETS[node].map(|o| o as f64 - 1.0)))
+/// Value and gradient of one shape function at a point of the face ζ = 1.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FaceShape {
+    /// The shape function N.
+    pub value: f64,
+    /// ∂N/∂ξ, ∂N/∂η.
+    pub gradient: [f64; 2],
+}
+
+/// Where the nodes of the face ζ = 1 lie, in the order of [`TOP_NODES`].
+const FACE_NODES_AT: [[f64; 2]; FACE_NODES] =
+    [[-1.0, -1.0], [0.0, -1.0], [1.0, -1.0], [-1.0, 0.0], [1.0, 0.0], [-1.0, 1.0], [0.0, 1.0], [1.0, 1.0]];
+
+/// The shape functions of the nodes of the face ζ = 1 at its point `at`, in the order of [`TOP_NODES`]: [`shapes`] there, in two dimensions.
+pub fn face_shapes([xi, eta]: [f64; 2]) -> [FaceShape; FACE_NODES] {
+    FACE_NODES_AT.map(|[a, b]| {
+        let (p, q) = (1.0 + a * xi, 1.0 + b * eta);
+        if a == 0.0 {
+            let bubble = 0.5 * (1.0 - xi * xi);
+            FaceShape { value: bubble * q, gradient: [-xi * q, bubble * b] }
+        } else if b == 0.0 {
+            let bubble = 0.5 * (1.0 - eta * eta);
+            FaceShape { value: bubble * p, gradient: [bubble * a, -eta * p] }
+        } else {
+            let s = p + q - 3.0;
+            FaceShape { value: 0.25 * p * q * s, gradient: [0.25 * a * q * (s + p), 0.25 * b * p * (s + q)] }
+        }
+    })
 }
 
 fn serendipity(at: [f64; 3], node: [f64; 3]) -> Shape {
