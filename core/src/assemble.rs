@@ -102,6 +102,15 @@ impl Dofs {
     }
 }
 
+/// Where an entry of a group's Hessian goes.
+#[derive(Clone, Copy, Debug)]
+struct Destination {
+    /// Its place in the group's own matrix, row by row.
+    local: u32,
+    /// Its place among the values.
+    value: u32,
+}
+
 /// Sparsity of the Hessian and the destination of every local entry.
 #[derive(Clone, Debug)]
 pub struct Pattern {
@@ -111,8 +120,8 @@ pub struct Pattern {
     pub column_starts: Vec<u32>,
     /// Row indices, ascending in each column.
     pub rows: Vec<u32>,
-    /// For each stencil set: destination of the lower-triangle entries of each group's Hessian, row by row.
-    destinations: Vec<Vec<u32>>,
+    /// For each stencil set: where the entries of each group's Hessian go.
+    destinations: Vec<Vec<Vec<Destination>>>,
     /// For each tail and stencil set: the groups whose unknowns are all in the tail or the border.
     tail_groups: Vec<Vec<Vec<usize>>>,
 }
@@ -160,19 +169,22 @@ impl Pattern {
                 column_starts[low as usize] + column.binary_search(&high).map_or(unstored, |at| at as u32)
             }
         };
-        let destinations = stencils
-            .iter()
-            .map(|set| {
-                let mut list = Vec::new();
-                for group in 0..set.len() {
-                    let dofs = locals(set, group);
-                    for row in 0..dofs.len() {
-                        list.extend((0..=row).map(|column| destination(dofs[row], dofs[column])));
-                    }
-                }
-                list
-            })
-            .collect();
+        let of_group = |set: &Stencils, group: usize| {
+            let dofs = locals(set, group);
+            let lower = (0..dofs.len()).flat_map(|row| (0..=row).map(move |column| (row, column)));
+            let mut list: Vec<Destination> = lower
+                .map(|(row, column)| Destination {
+                    local: (row * dofs.len() + column) as u32,
+                    value: destination(dofs[row], dofs[column]),
+                })
+                .filter(|entry| entry.value != unstored)
+                .collect();
+            // The values are too many for the first cache, the group's matrix is not: they are gone through in their order.
+            list.sort_unstable_by_key(|entry| entry.value);
+            list
+        };
+        let destinations =
+            stencils.iter().map(|set| (0..set.len()).map(|group| of_group(set, group)).collect()).collect();
         let groups_in = |tail: &usize| {
             let in_tail = |&dof: &u32| dof >= BORDER || dof as usize >= free - tail;
             let within = |set: &&Stencils| {
@@ -326,12 +338,8 @@ pub fn hessian(
             matrix[row * n..=row * n + row].fill(0.0);
         }
         term.effect.add_hessian(local, matrix);
-        let per_group = n * (n + 1) / 2;
-        let mut destinations = pattern.destinations[term.set][local.group * per_group..][..per_group].iter();
-        for row in 0..n {
-            for (value, &destination) in matrix[row * n..=row * n + row].iter().zip(&mut destinations) {
-                values[destination as usize] += value;
-            }
+        for &Destination { local: entry, value } in &pattern.destinations[term.set][local.group] {
+            values[value as usize] += matrix[entry as usize];
         }
     });
 }
