@@ -15,7 +15,7 @@ use thiserror::Error;
 
 use crate::effect::{Local, Stencils};
 use crate::kernel::Kernel;
-use crate::mesh::element::{MODES, NODES, POINTS, QUADRATURE};
+use crate::mesh::element::{FACE_NODES, MODES, NODES, POINTS, QUADRATURE};
 pub use stiffness::{PointRows, StiffnessCoefficients, Volumetric};
 
 /// One number per node for each component: a row of shape function gradients.
@@ -44,6 +44,26 @@ pub enum SolidGeometryError {
     },
 }
 
+/// The nodes of an element's face ζ = −1, the first of its nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Base {
+    /// They move.
+    Free,
+    /// They do not: no matrix needs what belongs to them.
+    Fixed,
+}
+
+impl Base {
+    /// How many of the element's nodes are left out of its matrix.
+    #[inline(always)]
+    fn nodes(self) -> usize {
+        match self {
+            Base::Free => 0,
+            Base::Fixed => FACE_NODES,
+        }
+    }
+}
+
 /// Rest geometry of every element of a stencil set.
 #[derive(Clone, Debug)]
 pub struct SolidGeometry {
@@ -55,6 +75,8 @@ pub struct SolidGeometry {
     mode_values: [[f64; MODES]; POINTS],
     /// Inverse of the rest-volume mass matrix of the pressure modes (1/mm³), one per element.
     mode_inverse: Vec<Matrix4<f64>>,
+    /// Base of each element; none: all are free.
+    bases: Vec<Base>,
 }
 
 impl SolidGeometry {
@@ -94,7 +116,17 @@ impl SolidGeometry {
         for (values, point) in mode_values.iter_mut().zip(reference.iter()) {
             *values = point.modes;
         }
-        Ok(SolidGeometry { gradients, weights, mode_values, mode_inverse })
+        Ok(SolidGeometry { gradients, weights, mode_values, mode_inverse, bases: Vec::new() })
+    }
+
+    /// The same with what each element stands on.
+    pub fn on(self, bases: Vec<Base>) -> Self {
+        SolidGeometry { bases, ..self }
+    }
+
+    #[inline(always)]
+    pub(super) fn base(&self, element: usize) -> Base {
+        self.bases.get(element).copied().unwrap_or(Base::Free)
     }
 
     /// Rest gradients of the shape functions at one point: three rows (x, y, z) of one number per node (1/mm).

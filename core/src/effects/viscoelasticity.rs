@@ -259,7 +259,8 @@ impl SolidEnergy for Viscoelasticity<'_> {
         }
         let mut isotropic = [[0.0; NODES]; NODES];
         let right = self.geometry.gradient_rows(local.group);
-        add_products([Products { scales: &scales, left: &pulled_rows, right }], &mut isotropic);
+        let base = self.geometry.base(local.group);
+        add_products(base, [Products { scales: &scales, left: &pulled_rows, right }], &mut isotropic);
         add_isotropic(&isotropic, out);
     }
 }

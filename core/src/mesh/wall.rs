@@ -13,7 +13,7 @@ use super::element::{NODE_OFFSETS, NODES, ORDER, TOP_NODES};
 use super::ordering::nested_dissection;
 use crate::assemble::{Dofs, Pattern};
 use crate::effect::{Effect, Stencils, Term};
-use crate::effects::solid::{SolidGeometry, SolidGeometryError};
+use crate::effects::solid::{Base, SolidGeometry, SolidGeometryError};
 use crate::solve::sparse::{LinearSolveError, SymbolicFactor};
 use crate::surface::Column;
 
@@ -78,6 +78,8 @@ pub struct WallTopology {
     pub elements: Stencils,
     /// Tissue layer of each element, inner layer 0.
     pub element_layer: Vec<usize>,
+    /// What each element stands on: the lowest ones on the fixed face.
+    pub bases: Vec<Base>,
     /// Inner-surface faces: face nodes, then the needle.
     pub faces: Stencils,
     /// The needle.
@@ -160,6 +162,7 @@ impl WallTopology {
 
         let mut elements = Stencils { group_size: NODES, vertices: Vec::new() };
         let mut element_layer = Vec::new();
+        let mut bases = Vec::new();
         let mut faces = Stencils { group_size: 0, vertices: Vec::new() };
         let mut face_points = Vec::new();
         let mut interface = Stencils { group_size: 2 * TOP_NODES.len(), vertices: Vec::new() };
@@ -167,6 +170,8 @@ impl WallTopology {
             for (at, &layer) in layers.iter().enumerate() {
                 elements.vertices.extend(offsets.iter().map(|&o| index[&lattice(cell, at, o)] as u32));
                 element_layer.push(layer);
+                let on_level = lattice(cell, at, [0; 3]).1;
+                bases.push(if on_level == 0 { Base::Fixed } else { Base::Free });
             }
             let face: Vec<usize> =
                 TOP_NODES.iter().map(|&a| index[&lattice(cell, layers.len() - 1, offsets[a])]).collect();
@@ -195,6 +200,7 @@ impl WallTopology {
             disc,
             elements,
             element_layer,
+            bases,
             faces,
             tip,
             interface,
@@ -267,7 +273,7 @@ impl WallGeometry {
             rest.extend_from_slice(position.coords.as_slice());
         }
         rest.extend_from_slice(&[0.0; 3]);
-        let solid = SolidGeometry::new(&topology.elements, &rest)?;
+        let solid = SolidGeometry::new(&topology.elements, &rest)?.on(topology.bases.clone());
         let layer_coordinates = topology.vertices.iter().map(|&(_, level)| levels[level].layer_coordinate).collect();
         Ok(WallGeometry { parameters, rest, layer_coordinates, solid })
     }

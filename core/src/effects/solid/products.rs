@@ -3,8 +3,8 @@
 //! The sum of one block stays in registers, a tile of four rows and up to three vectors at a time, while it runs over the products; the block itself is touched once. What the left
 //! rows are scaled by is multiplied in four of their numbers at a time: all of an element's rows, scaled, would not stay in the first cache. Not here: what the rows mean.
 
-use super::LANES;
-use crate::mesh::element::{NODES, POINTS};
+use super::{Base, LANES};
+use crate::mesh::element::{FACE_NODES, NODES, POINTS};
 
 /// One number for each pair of nodes of an element.
 pub(in crate::effects) type NodePairs = [[f64; NODES]; NODES];
@@ -20,21 +20,44 @@ pub(in crate::effects) struct Products<'a> {
     pub right: &'a [[f64; NODES]],
 }
 
-/// Adds `sums`, [`MOST`] products in all at most, to `block`, whose rows are the nodes on the left.
+/// Adds `sums`, [`MOST`] products in all at most, to `block`, whose rows are the nodes on the left; what belongs to the element's base is left out where it does not move.
 #[inline(always)]
-pub(in crate::effects) fn add_products<const SUMS: usize>(sums: [Products; SUMS], block: &mut NodePairs) {
+pub(in crate::effects) fn add_products<const SUMS: usize>(base: Base, sums: [Products; SUMS], block: &mut NodePairs) {
     let mut scaled = [[0.0; LANES]; MOST];
-    for row in (0..NODES).step_by(LANES) {
-        scale_rows(row, &sums, &mut scaled);
-        add_tile::<3, SUMS>([row, 0], &scaled, &sums, block);
-        add_tile::<2, SUMS>([row, 3], &scaled, &sums, block);
+    match base {
+        Base::Free => {
+            for row in (0..NODES).step_by(LANES) {
+                scale_rows(row, &sums, &mut scaled);
+                add_tile::<3, SUMS>([row, 0], &scaled, &sums, block);
+                add_tile::<2, SUMS>([row, 3], &scaled, &sums, block);
+            }
+        }
+        Base::Fixed => {
+            for row in (FACE_NODES..NODES).step_by(LANES) {
+                scale_rows(row, &sums, &mut scaled);
+                add_tile::<3, SUMS>([row, 2], &scaled, &sums, block);
+            }
+        }
     }
 }
 
-/// As [`add_products`], for a sum that is symmetric: what lies above the diagonal by more than a vector is left out.
+/// As [`add_products`], for a sum that is symmetric: what lies above the diagonal by more than a vector is left out too.
 #[inline(always)]
-pub(in crate::effects) fn add_symmetric_products<const SUMS: usize>(sums: [Products; SUMS], block: &mut NodePairs) {
+pub(in crate::effects) fn add_symmetric_products<const SUMS: usize>(
+    base: Base,
+    sums: [Products; SUMS],
+    block: &mut NodePairs,
+) {
     let mut scaled = [[0.0; LANES]; MOST];
+    if base == Base::Fixed {
+        scale_rows(8, &sums, &mut scaled);
+        add_tile::<1, SUMS>([8, 2], &scaled, &sums, block);
+        scale_rows(12, &sums, &mut scaled);
+        add_tile::<2, SUMS>([12, 2], &scaled, &sums, block);
+        scale_rows(16, &sums, &mut scaled);
+        add_tile::<3, SUMS>([16, 2], &scaled, &sums, block);
+        return;
+    }
     scale_rows(0, &sums, &mut scaled);
     add_tile::<1, SUMS>([0, 0], &scaled, &sums, block);
     scale_rows(4, &sums, &mut scaled);

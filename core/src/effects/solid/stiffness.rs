@@ -40,7 +40,7 @@ impl SolidGeometry {
     /// Adds the element matrix (lower triangle): its point-wise part for the given coefficients, quadrature weight included, and, of an energy of the projected
     /// dilatation θ, the part Σ_q w U″(θ_q) ∇θ_q ⊗ ∇θ_q.
     ///
-    /// Each block of it (component i by component j) is one sum of outer products of rows of numbers per node.
+    /// Each block of it (component i by component j) is one sum of outer products of rows of numbers per node. What belongs to a base that does not move is left out.
     #[inline(always)]
     pub fn add_stiffness(
         &self,
@@ -50,6 +50,7 @@ impl SolidGeometry {
         volumetric: Option<&Volumetric>,
         out: &mut [f64],
     ) {
+        let base = self.base(element);
         let StiffnessCoefficients { rest, cross, outer } = coefficients;
         let mut isotropic = [[0.0; NODES]; NODES];
         if rest.iter().any(|c| *c != 0.0) {
@@ -58,7 +59,8 @@ impl SolidGeometry {
             for (row, scale) in scales.iter_mut().enumerate() {
                 *scale = rest[row / 3];
             }
-            add_symmetric_products([Products { scales: &scales, left: gradients, right: gradients }], &mut isotropic);
+            let sum = Products { scales: &scales, left: gradients, right: gradients };
+            add_symmetric_products(base, [sum], &mut isotropic);
         }
         let mut both = [0.0; POINTS];
         for q in 0..POINTS {
@@ -78,14 +80,14 @@ impl SolidGeometry {
             if i == j {
                 block = isotropic;
                 let of_points = Products { scales: &both, left: &spatial[i], right: &spatial[i] };
-                add_symmetric_products([of_points, of_modes], &mut block);
+                add_symmetric_products(base, [of_points, of_modes], &mut block);
             } else {
                 let of_cross = Products { scales: cross, left: &spatial[j], right: &spatial[i] };
                 let of_outer =
                     Products { scales: &outer[..outers], left: &spatial[i][..outers], right: &spatial[j][..outers] };
-                add_products([of_cross, of_outer, of_modes], &mut block);
+                add_products(base, [of_cross, of_outer, of_modes], &mut block);
             }
-            for (a, block) in block.iter().enumerate() {
+            for (a, block) in block.iter().enumerate().skip(base.nodes()) {
                 let row = &mut rows[(i * NODES + a) * 3 + j];
                 for b in 0..NODES {
                     row[b] += block[b];
@@ -120,7 +122,7 @@ impl SolidGeometry {
         }
         let (mut integrals, mut scaled) = ([[[0.0; NODES]; MODES]; 3], [[[0.0; NODES]; MODES]; 3]);
         for k in 0..3 {
-            for chunk in 0..NODES / LANES {
+            for chunk in self.base(element).nodes() / LANES..NODES / LANES {
                 let mut sum = [[0.0; LANES]; MODES];
                 for q in 0..POINTS {
                     let gradient = &spatial[k][q].as_chunks::<LANES>().0[chunk];
