@@ -11,6 +11,7 @@
 //! Not here: friction, search for candidate faces beyond a bound for each.
 
 mod face_rule;
+mod gaps;
 
 use std::sync::Arc;
 
@@ -18,9 +19,10 @@ use nalgebra::{Point3, Rotation3, Vector3};
 
 use crate::effect::{Effect, Local, Stencils};
 use crate::mesh::element::FACE_NODES;
-use crate::needle::{Body, SignedDistance};
+use crate::needle::Body;
 use face_rule::FaceRule;
 pub use face_rule::{FaceStiffness, GROUP};
+use gaps::Gaps;
 
 /// Name of the effect.
 pub const NAME: &str = "contact";
@@ -134,34 +136,28 @@ impl Contact<'_> {
         std::array::from_fn(|a| needle_from_frame * (vertex(local, a) - tip))
     }
 
-    /// A quadrature point's position in needle coordinates.
-    fn in_needle(&self, nodes: &[Vector3<f64>; FACE_NODES], point: usize) -> Point3<f64> {
-        let mut at = Vector3::zeros();
-        for (node, value) in nodes.iter().zip(self.faces.values(point)) {
-            at += node * *value;
-        }
-        Point3::from(at)
+    /// Where the quadrature points of a face are.
+    fn gaps(&self, local: &Local) -> Gaps {
+        Gaps::new(&self.faces.rule, &self.nodes_in_needle(local), self.shape)
     }
 
     /// Gap, pressure and position of every quadrature point of a face.
     pub fn contact_points<'b>(&'b self, local: &'b Local) -> impl Iterator<Item = ContactPoint> + 'b {
-        let nodes = self.nodes_in_needle(local);
+        let gaps = self.gaps(local);
         self.faces.areas(local.group).iter().enumerate().map(move |(point, &area_mm2)| {
-            let at = self.in_needle(&nodes, point);
-            let gap_mm = self.shape.distance(&at);
-            let position = Point3::from(self.frame_from_needle * at.coords + self.tip(local));
+            let gap_mm = gaps.mm(point);
+            let position = Point3::from(self.frame_from_needle * gaps.at(point).coords + self.tip(local));
             ContactPoint { gap_mm, pressure_kpa: -self.penalty(gap_mm).1, area_mm2, position }
         })
     }
 
     /// The points of a face that press, each with its force (mN) and the needle's outward normal in the frame of the positions.
     pub fn pressing<'b>(&'b self, local: &'b Local) -> impl Iterator<Item = (usize, f64, Vector3<f64>)> + 'b {
-        let nodes = self.nodes_in_needle(local);
+        let gaps = self.gaps(local);
         let points = self.faces.areas(local.group).iter().enumerate();
         points.filter_map(move |(point, area)| {
-            let at = self.in_needle(&nodes, point);
-            let pressure_kpa = -self.penalty(self.shape.distance(&at)).1;
-            let normal = || (self.frame_from_needle * self.shape.signed_distance(&at).gradient).normalize();
+            let pressure_kpa = -self.penalty(gaps.mm(point)).1;
+            let normal = || (self.frame_from_needle * self.shape.distance_and_gradient(&gaps.at(point)).1).normalize();
             (pressure_kpa > 0.0).then(|| (point, pressure_kpa * area, normal()))
         })
     }
@@ -170,26 +166,24 @@ impl Contact<'_> {
     /// tangent at the middle of the corners; along this a face reaches no further than its corners and the bulges of its edges.
     fn nearest_bound_mm(&self, nodes: &[Vector3<f64>; FACE_NODES]) -> f64 {
         let middle = CORNERS.map(|corner| nodes[corner]).iter().sum::<Vector3<f64>>() / CORNERS.len() as f64;
-        let tangent = self.shape.signed_distance(&Point3::from(middle));
-        let along = nodes.map(|node| tangent.gradient.dot(&(node - middle)));
+        let (at_middle_mm, gradient) = self.shape.distance_and_gradient(&Point3::from(middle));
+        let along = nodes.map(|node| gradient.dot(&(node - middle)));
         let corner = CORNERS.map(|corner| along[corner]).into_iter().fold(f64::INFINITY, f64::min);
         // Of two opposite edges the shape functions of the middle nodes add up to one at most.
         let bulges = OPPOSITE_EDGES.map(|pair| {
             let bulge = |[from, middle, to]: [usize; 3]| along[middle] - 0.5 * (along[from] + along[to]);
             pair.map(bulge).into_iter().fold(0.0, f64::min)
         });
-        tangent.value + corner + bulges.iter().sum::<f64>()
+        at_middle_mm + corner + bulges.iter().sum::<f64>()
     }
 
-    /// Calls `visit(point, its area, its signed distance)` for each point of the face in contact.
-    fn for_each_touching(&self, local: &Local, mut visit: impl FnMut(usize, f64, SignedDistance)) {
-        let nodes = self.nodes_in_needle(local);
-        for (point, &area) in self.faces.areas(local.group).iter().enumerate() {
-            let at = self.in_needle(&nodes, point);
-            if self.shape.distance(&at) < self.smoothing_mm {
-                visit(point, area, self.shape.signed_distance(&at));
-            }
-        }
+    /// The points of the face in contact: each with its area (mm²) and its position in needle coordinates.
+    fn touching<'b>(&'b self, local: &Local) -> impl Iterator<Item = (usize, f64, Point3<f64>)> + 'b {
+        let gaps = self.gaps(local);
+        let points = self.faces.areas(local.group).iter().enumerate();
+        points.filter_map(move |(point, &area)| {
+            (gaps.mm(point) < self.smoothing_mm).then(|| (point, area, gaps.at(point)))
+        })
     }
 }
 
@@ -212,11 +206,11 @@ impl Effect for Contact<'_> {
     }
 
     fn predict_stress(&self, local: &Local, step: &[f64], out: &mut [f64]) {
-        let nodes = self.nodes_in_needle(local);
+        let gaps = self.gaps(local);
         for (point, predicted) in out.iter_mut().enumerate() {
-            let distance = self.shape.signed_distance(&self.in_needle(&nodes, point));
-            let (_, slope, curvature) = self.penalty(distance.value);
-            let normal = self.frame_from_needle * distance.gradient;
+            let (gap_mm, gradient) = self.shape.distance_and_gradient(&gaps.at(point));
+            let (_, slope, curvature) = self.penalty(gap_mm);
+            let normal = self.frame_from_needle * gradient;
             let closing: f64 = self
                 .faces
                 .weights(point)
@@ -229,32 +223,34 @@ impl Effect for Contact<'_> {
     }
 
     fn energy(&self, local: &Local) -> f64 {
-        let nodes = self.nodes_in_needle(local);
+        let gaps = self.gaps(local);
         let areas = self.faces.areas(local.group).iter().enumerate();
-        areas.map(|(point, area)| area * self.penalty(self.shape.distance(&self.in_needle(&nodes, point))).0).sum()
+        areas.map(|(point, area)| area * self.penalty(gaps.mm(point)).0).sum()
     }
 
     fn add_gradient(&self, local: &Local, out: &mut [f64]) {
-        self.for_each_touching(local, |point, area, distance| {
-            let force = self.frame_from_needle * distance.gradient * (area * self.penalty(distance.value).1);
+        for (point, area, at) in self.touching(local) {
+            let (gap_mm, gradient) = self.shape.distance_and_gradient(&at);
+            let force = self.frame_from_needle * gradient * (area * self.penalty(gap_mm).1);
             for (k, out) in out.as_chunks_mut::<GROUP>().0.iter_mut().enumerate() {
                 for (out, weight) in out.iter_mut().zip(self.faces.weights(point)) {
                     *out += weight * force[k];
                 }
             }
-        });
+        }
     }
 
     fn add_hessian(&self, local: &Local, out: &mut [f64]) {
         let rotation = self.frame_from_needle.matrix();
         let mut stiffness = self.faces.stiffness();
-        self.for_each_touching(local, |point, area, distance| {
+        for (point, area, at) in self.touching(local) {
+            let distance = self.shape.signed_distance(&at);
             let (_, slope, curvature) = self.penalty(distance.value);
             let normal = distance.gradient;
             let bending_slope = local.predicted.get(point).copied().unwrap_or(slope);
             let of_point = normal * normal.transpose() * curvature + distance.hessian * bending_slope;
             stiffness.add(point, &(rotation * (of_point * area) * rotation.transpose()));
-        });
+        }
         stiffness.add_to(out);
     }
 }

@@ -154,10 +154,13 @@ fn serendipity(at: [f64; 3], node: [f64; 3]) -> Shape {
     }
 }
 
+/// Points of the longest rule that [`gauss_rule`] knows.
+pub const MOST_GAUSS_POINTS: usize = 5;
+
 /// Gauss–Legendre points and weights on [−1, 1] (Abramowitz & Stegun, table 25.4).
 ///
 /// # Panics
-/// For other than 2 to 5 points: callers name constants.
+/// For other than 2 to [`MOST_GAUSS_POINTS`] points: callers name constants.
 pub fn gauss_rule(points: usize) -> Vec<(f64, f64)> {
     match points {
         2 => {

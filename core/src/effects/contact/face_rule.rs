@@ -15,8 +15,11 @@ use crate::mesh::element::{FACE_NODES, face_shapes, gauss_rule};
 /// Vertices of a group: those of the face, then the needle.
 pub const GROUP: usize = FACE_NODES + 1;
 
-/// Products of two weights, the second vertex not after the first, padded to whole vectors of four.
-const PAIRS: usize = (GROUP * (GROUP + 1) / 2).next_multiple_of(4);
+/// Numbers that are computed side by side.
+pub(super) const LANES: usize = 4;
+
+/// Products of two weights, the second vertex not after the first, padded to whole vectors.
+const PAIRS: usize = (GROUP * (GROUP + 1) / 2).next_multiple_of(LANES);
 
 /// Shape functions at the quadrature points of the reference face.
 #[derive(Debug)]
@@ -25,6 +28,8 @@ pub(super) struct FaceRule {
     pub weights: Vec<[f64; GROUP]>,
     /// Quadrature weight of each point, and the slopes of the shape functions there.
     pub slopes: Vec<(f64, [[f64; 2]; FACE_NODES])>,
+    /// Values of each of the face's shape functions at as many points as are computed side by side, then those at the next; zero beyond the last point.
+    pub side_by_side: Vec<[[f64; LANES]; FACE_NODES]>,
     pairs: Vec<[f64; PAIRS]>,
 }
 
@@ -40,7 +45,8 @@ impl FaceRule {
 
     fn new(points_per_edge: usize) -> Self {
         let rule = gauss_rule(points_per_edge);
-        let mut out = FaceRule { weights: Vec::new(), slopes: Vec::new(), pairs: Vec::new() };
+        let side_by_side = vec![[[0.0; LANES]; FACE_NODES]; rule.len().pow(2).div_ceil(LANES)];
+        let mut out = FaceRule { weights: Vec::new(), slopes: Vec::new(), side_by_side, pairs: Vec::new() };
         for &(eta, w_eta) in &rule {
             for &(xi, w_xi) in &rule {
                 let shapes = face_shapes([xi, eta]);
@@ -51,6 +57,10 @@ impl FaceRule {
                 let mut pairs = [0.0; PAIRS];
                 let products = (0..GROUP).flat_map(|a| (0..=a).map(move |b| weights[a] * weights[b]));
                 pairs.iter_mut().zip(products).for_each(|(pair, product)| *pair = product);
+                let point = out.weights.len();
+                for (values, value) in out.side_by_side[point / LANES].iter_mut().zip(weights) {
+                    values[point % LANES] = value;
+                }
                 out.weights.push(weights);
                 out.slopes.push((w_xi * w_eta, shapes.map(|shape| [shape.gradient[0], shape.gradient[1]])));
                 out.pairs.push(pairs);
