@@ -117,8 +117,8 @@ impl System<'_> {
         let refined = found.map(|found| {
             let change: Vec<f64> = found[..size].iter().zip(start).map(|(new, old)| new - old).collect();
             let mut rest = vec![0.0; free];
-            rest[first..].copy_from_slice(&condensed.whole.times(&change));
-            workspace.factor.substitute(self.symbolic, &mut rest);
+            rest[first..].copy_from_slice(&change);
+            workspace.factor.complete(self.symbolic, size, &mut rest);
             rest.iter_mut().zip(newton).for_each(|(r, n)| *r += n);
             rest.extend_from_slice(&found[size..]);
             rest

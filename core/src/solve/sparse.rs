@@ -9,6 +9,7 @@
 //! Read on in `numeric` (what faer is asked for).
 
 mod numeric;
+mod substitution;
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::sparse::SymbolicSparseColMatRef;
@@ -22,6 +23,7 @@ use thiserror::Error;
 use super::dense::Dense;
 use crate::assemble::Pattern;
 use numeric::Numeric;
+use substitution::Supernode;
 
 /// Why a linear system was not solved.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -44,8 +46,6 @@ pub enum LinearSolveError {
 pub const MAX_RELATIVE_RESIDUAL: f64 = 1e-6;
 /// Steps of refinement at most; each brings the residual down by what the one before left.
 const MOST_REFINEMENTS: usize = 2;
-/// Right-hand sides that are solved for at once, at most: the residual, three directions of a drive and the slope of what is held.
-const MOST_COLUMNS: usize = 5;
 /// Relative residual above which single precision does not suffice: a factor this far off also tells Newton's method little about its steps.
 const SINGLE_SUFFICES: f64 = 1e-4;
 
@@ -53,6 +53,7 @@ const SINGLE_SUFFICES: f64 = 1e-4;
 #[derive(Debug)]
 pub struct SymbolicFactor {
     symbolic: SymbolicCholesky<u32>,
+    supernodes: Vec<Supernode>,
     scratch: StackReq,
 }
 
@@ -75,10 +76,10 @@ impl SymbolicFactor {
         let scratch = StackReq::any_of(&[
             symbolic.factorize_numeric_llt_scratch::<f32>(Par::Seq, Spec::default()),
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
-            symbolic.solve_in_place_scratch::<f32>(MOST_COLUMNS, Par::Seq),
-            symbolic.solve_in_place_scratch::<f64>(MOST_COLUMNS, Par::Seq),
         ]);
-        Ok(SymbolicFactor { symbolic, scratch })
+        let supernodes = numeric::supernodes(&symbolic);
+        let supernodes = supernodes.ok_or_else(|| LinearSolveError::Analysis("no supernodes".to_string()))?;
+        Ok(SymbolicFactor { symbolic, supernodes, scratch })
     }
 
     /// Number of stored entries of the factor.
@@ -214,13 +215,38 @@ impl Factor {
 
     /// As [`Factor::solve`], unchecked: what is made of the solutions is to be checked.
     pub(super) fn substitute(&mut self, symbolic: &SymbolicFactor, rhs: &mut [f64]) {
+        let SymbolicFactor { supernodes, symbolic, .. } = symbolic;
+        let size = symbolic.nrows();
+        self.in_its_precision(
+            rhs,
+            |single, rhs| single.substitute(supernodes, size, rhs),
+            |double, rhs| double.substitute(supernodes, size, rhs),
+        );
+    }
+
+    /// Completes the solution of a system with nothing on the right-hand side above its last `known` unknowns, of which the end of `x` holds the values.
+    pub(super) fn complete(&mut self, symbolic: &SymbolicFactor, known: usize, x: &mut [f64]) {
+        let supernodes = &symbolic.supernodes;
+        self.in_its_precision(
+            x,
+            |single, x| single.complete(supernodes, known, x),
+            |double, x| double.complete(supernodes, known, x),
+        );
+    }
+
+    fn in_its_precision(
+        &mut self,
+        columns: &mut [f64],
+        single: impl Fn(&mut Numeric<f32>, &mut [f32]),
+        double: impl Fn(&mut Numeric<f64>, &mut [f64]),
+    ) {
         match self.at_hand {
             Precision::Single => {
-                self.round(rhs);
-                self.single.substitute(&symbolic.symbolic, &mut self.rounded, MemStack::new(&mut self.stack));
-                rhs.iter_mut().zip(&self.rounded).for_each(|(x, rounded)| *x = f64::from(*rounded));
+                self.round(columns);
+                single(&mut self.single, &mut self.rounded);
+                columns.iter_mut().zip(&self.rounded).for_each(|(x, rounded)| *x = f64::from(*rounded));
             }
-            Precision::Double => self.double.substitute(&symbolic.symbolic, rhs, MemStack::new(&mut self.stack)),
+            Precision::Double => double(&mut self.double, columns),
         }
     }
 
@@ -280,8 +306,8 @@ impl Factor {
     /// The last `size` rows and columns of the factor L, with a border of `border` rows of zeros.
     pub(super) fn tail(&self, symbolic: &SymbolicFactor, size: usize, border: usize) -> Dense {
         match self.at_hand {
-            Precision::Single => self.single.tail(&symbolic.symbolic, size, border),
-            Precision::Double => self.double.tail(&symbolic.symbolic, size, border),
+            Precision::Single => self.single.tail(&symbolic.supernodes, size, border),
+            Precision::Double => self.double.tail(&symbolic.supernodes, size, border),
         }
     }
 

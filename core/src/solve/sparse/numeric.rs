@@ -4,24 +4,27 @@
 
 use faer::dyn_stack::MemStack;
 use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
-use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymbolicCholeskyRaw};
+use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::traits::RealField;
-use faer::{Conj, MatMut, Par, Side, Spec};
+use faer::{Par, Side, Spec};
 
+use super::substitution::{Number, Substitution, Supernode};
 use crate::assemble::Pattern;
+use crate::kernel::run_kernel;
 use crate::solve::dense::Dense;
 
 /// The values of the factor L.
 pub(super) struct Numeric<T> {
     values: Vec<T>,
+    /// Of a substitution.
+    memory: Vec<T>,
 }
 
-impl<T: RealField + Copy + Into<f64>> Numeric<T> {
+impl<T: RealField + Number + Into<f64>> Numeric<T> {
     /// No factor yet.
     pub fn empty() -> Self {
-        Numeric { values: Vec::new() }
+        Numeric { values: Vec::new(), memory: Vec::new() }
     }
 
     /// Factorises the matrix with the sparse entries `matrix` in the layout of `pattern`; whether it is positive definite.
@@ -49,34 +52,53 @@ impl<T: RealField + Copy + Into<f64>> Numeric<T> {
     }
 
     /// Solves in place, for right-hand sides one after the other.
-    pub fn substitute(&self, symbolic: &SymbolicCholesky<u32>, rhs: &mut [T], stack: &mut MemStack) {
-        let n = symbolic.nrows();
-        let columns = MatMut::from_column_major_slice_mut(rhs, n, rhs.len() / n);
-        LltRef::new(symbolic, &self.values).solve_in_place_with_conj(Conj::No, columns, Par::Seq, stack);
+    pub fn substitute(&mut self, supernodes: &[Supernode], size: usize, rhs: &mut [T]) {
+        for x in rhs.chunks_exact_mut(size) {
+            let memory = &mut self.memory;
+            run_kernel(Substitution { supernodes, factor: &self.values, x, known: None, memory });
+        }
+    }
+
+    /// Completes the solution of a system with nothing on the right-hand side above its last `known` unknowns, of which the end of `x` holds the values.
+    pub fn complete(&mut self, supernodes: &[Supernode], known: usize, x: &mut [T]) {
+        let memory = &mut self.memory;
+        run_kernel(Substitution { supernodes, factor: &self.values, x, known: Some(known), memory });
     }
 
     /// The last `size` rows and columns of L, with a border of `border` rows of zeros.
-    pub fn tail(&self, symbolic: &SymbolicCholesky<u32>, size: usize, border: usize) -> Dense {
+    pub fn tail(&self, supernodes: &[Supernode], size: usize, border: usize) -> Dense {
         let mut tail = Dense::zeros(size, border);
-        let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { return tail };
-        let first = raw.nrows() - size;
-        let factor = SupernodalLltRef::new(raw, &self.values);
-        for index in (0..raw.n_supernodes()).rev() {
-            let supernode = factor.supernode(index);
-            let (start, values) = (supernode.start(), supernode.val());
-            if start + values.ncols() <= first {
+        let first = supernodes.last().map_or(0, |last| last.start + last.columns) - size;
+        for Supernode { start, columns, below, values } in supernodes.iter().rev() {
+            if start + columns <= first {
                 break;
             }
-            for column in first.saturating_sub(start)..values.ncols() {
+            let rows = columns + below.len();
+            let block = &self.values[values.clone()];
+            for column in first.saturating_sub(*start)..*columns {
                 let to = start + column - first;
-                for row in column..values.ncols() {
-                    tail.set(start + row - first, to, values[(row, column)].into());
+                let entries = &block[column * rows..][..rows];
+                for row in column..*columns {
+                    tail.set(start + row - first, to, entries[row].into());
                 }
-                for (row, &at) in supernode.pattern().iter().enumerate() {
-                    tail.set(at as usize - first, to, values[(values.ncols() + row, column)].into());
+                for (entry, &row) in entries[*columns..].iter().zip(below) {
+                    tail.set(row as usize - first, to, (*entry).into());
                 }
             }
         }
         tail
     }
+}
+
+/// The supernodes of a factor; `None` if it has none.
+pub(super) fn supernodes(symbolic: &SymbolicCholesky<u32>) -> Option<Vec<Supernode>> {
+    let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { return None };
+    let (begins, ends, values) = (raw.supernode_begin(), raw.supernode_end(), raw.col_ptr_for_val());
+    let supernode = |index: usize| Supernode {
+        start: begins[index] as usize,
+        columns: (ends[index] - begins[index]) as usize,
+        below: raw.supernode(index).pattern().to_vec(),
+        values: values[index] as usize..values[index + 1] as usize,
+    };
+    Some((0..raw.n_supernodes()).map(supernode).collect())
 }
