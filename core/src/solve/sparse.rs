@@ -12,11 +12,11 @@ mod numeric;
 mod substitution;
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
+use faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use faer::{Par, Side, Spec};
 use thiserror::Error;
 
@@ -53,6 +53,8 @@ const SINGLE_SUFFICES: f64 = 1e-4;
 #[derive(Debug)]
 pub struct SymbolicFactor {
     symbolic: SymbolicCholesky<u32>,
+    /// The lower triangle, checked once for all.
+    structure: SymbolicSparseColMat<u32>,
     supernodes: Vec<Supernode>,
     scratch: StackReq,
 }
@@ -79,7 +81,9 @@ impl SymbolicFactor {
         ]);
         let supernodes = numeric::supernodes(&symbolic);
         let supernodes = supernodes.ok_or_else(|| LinearSolveError::Analysis("no supernodes".to_string()))?;
-        Ok(SymbolicFactor { symbolic, supernodes, scratch })
+        let (starts, rows) = (pattern.column_starts.clone(), pattern.rows.clone());
+        let structure = SymbolicSparseColMat::new_checked(n, n, starts, None, rows);
+        Ok(SymbolicFactor { symbolic, structure, supernodes, scratch })
     }
 
     /// Number of stored entries of the factor.
@@ -165,7 +169,7 @@ impl Factor {
             self.round(&values[..pattern.stored()]);
             let stack = MemStack::new(&mut self.stack);
             self.at_hand = Precision::Single;
-            if self.single.factorize(&symbolic.symbolic, pattern, &self.rounded, stack) {
+            if self.single.factorize(&symbolic.symbolic, symbolic.structure.as_ref(), &self.rounded, stack) {
                 return Ok(());
             }
             // What seems indefinite in single precision may be definite in double; and what is about to buckle is close to singular from here on.
@@ -182,7 +186,8 @@ impl Factor {
     ) -> Result<(), LinearSolveError> {
         let stack = MemStack::new(&mut self.stack);
         self.at_hand = Precision::Double;
-        match self.double.factorize(&symbolic.symbolic, pattern, &values[..pattern.stored()], stack) {
+        match self.double.factorize(&symbolic.symbolic, symbolic.structure.as_ref(), &values[..pattern.stored()], stack)
+        {
             true => Ok(()),
             false => Err(LinearSolveError::Indefinite),
         }

@@ -10,7 +10,6 @@ use faer::traits::RealField;
 use faer::{Par, Side, Spec};
 
 use super::substitution::{Number, Substitution, Supernode};
-use crate::assemble::Pattern;
 use crate::kernel::run_kernel;
 use crate::solve::dense::Dense;
 
@@ -27,17 +26,15 @@ impl<T: RealField + Number + Into<f64>> Numeric<T> {
         Numeric { values: Vec::new(), memory: Vec::new() }
     }
 
-    /// Factorises the matrix with the sparse entries `matrix` in the layout of `pattern`; whether it is positive definite.
+    /// Factorises the matrix with the entries `matrix` in the lower triangle `structure`; whether it is positive definite.
     pub fn factorize(
         &mut self,
         symbolic: &SymbolicCholesky<u32>,
-        pattern: &Pattern,
+        structure: SymbolicSparseColMatRef<u32>,
         matrix: &[T],
         stack: &mut MemStack,
     ) -> bool {
-        let n = pattern.free;
         self.values.resize(symbolic.len_val(), T::zero_impl());
-        let structure = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.rows);
         symbolic
             .factorize_numeric_llt(
                 &mut self.values,
