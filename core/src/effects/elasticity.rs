@@ -7,6 +7,7 @@
 use nalgebra::Matrix3;
 
 use super::finite_strain::Lame;
+use super::solid::points::{IDENTITIES, PLACES, PointNumbers, matrix_at, put_matrix};
 use super::solid::{Energy, Gradient, Hessian, SolidEnergy, SolidGeometry, StiffnessCoefficients, Volumetric};
 use crate::effect::{Effect, Local};
 use crate::kernel::run_kernel;
@@ -26,12 +27,13 @@ pub struct Elasticity<'a> {
 impl Elasticity<'_> {
     /// Strain at the quadrature points and its projected trace.
     #[inline(always)]
-    fn strains(&self, local: &Local) -> ([Matrix3<f64>; POINTS], [f64; POINTS]) {
+    fn strains(&self, local: &Local) -> ([Matrix3<f64>; POINTS], PointNumbers) {
         let mut strain = [Matrix3::zeros(); POINTS];
-        let mut trace = [0.0; POINTS];
-        let f = self.geometry.deformation_gradients(local.group, local.current);
+        let mut trace = [0.0; PLACES];
+        let mut f = IDENTITIES;
+        self.geometry.deformation_gradients(local.group, local.current, &mut f);
         for q in 0..POINTS {
-            let h = f[q] - Matrix3::identity();
+            let h = matrix_at(&f, q) - Matrix3::identity();
             strain[q] = (h + h.transpose()) * 0.5;
             trace[q] = h.trace();
         }
@@ -55,10 +57,11 @@ impl SolidEnergy for Elasticity<'_> {
     fn add_gradient_n(&self, local: &Local, out: &mut [f64]) {
         let (strain, trace) = self.strains(local);
         let material = &self.materials[local.group];
-        let mut stress = [Matrix3::zeros(); POINTS];
+        let mut stress = IDENTITIES;
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
             // The projection is self-adjoint and idempotent: the stress needs no second projection.
-            stress[q] = (strain[q] * (2.0 * material.mu) + Matrix3::identity() * (material.lambda * trace[q])) * weight;
+            let at = strain[q] * (2.0 * material.mu) + Matrix3::identity() * (material.lambda * trace[q]);
+            put_matrix(&mut stress, q, &(at * weight));
         }
         self.geometry.add_force(local.group, &stress, out);
     }

@@ -11,11 +11,10 @@
 //! With π the projected pressure U′(θ), the stress is P = P_pointwise + π J F⁻ᵀ and the second derivative follows from
 //! ∂²J/∂xₐᵢ∂x_bⱼ = J (gₐᵢ g_bⱼ − gₐⱼ g_bᵢ).
 
-use nalgebra::Matrix3;
-
+use super::solid::points::{IDENTITIES, PLACES, PointMatrices, PointNumbers, determinants_and_cofactors, matrix_at};
 use super::solid::{
     Energy, Gradient, Hessian, MaxStep, PointRows, SolidEnergy, SolidGeometry, StiffnessCoefficients, Volumetric,
-    determinant_and_cofactor, push_forward,
+    push_forward,
 };
 use crate::effect::{Effect, Local};
 use crate::kernel::{Kernel, run_kernel};
@@ -54,32 +53,57 @@ pub struct FiniteStrain<'a> {
 
 /// What every derivative needs at the quadrature points of one element.
 struct Points {
-    f: [Matrix3<f64>; POINTS],
-    f_inverse_transposed: [Matrix3<f64>; POINTS],
-    j: [f64; POINTS],
-    theta: [f64; POINTS],
+    f: PointMatrices,
+    f_inverse_transposed: PointMatrices,
+    j: PointNumbers,
+    theta: PointNumbers,
+}
+
+impl Points {
+    /// At rest.
+    const REST: Self =
+        Points { f: IDENTITIES, f_inverse_transposed: IDENTITIES, j: [1.0; PLACES], theta: [1.0; PLACES] };
+
+    /// F:F at every point.
+    #[inline(always)]
+    fn squared_stretches(&self) -> PointNumbers {
+        let mut sums = [0.0; PLACES];
+        for row in &self.f {
+            for entries in row {
+                for q in 0..PLACES {
+                    sums[q] += entries[q] * entries[q];
+                }
+            }
+        }
+        sums
+    }
 }
 
 impl FiniteStrain<'_> {
-    /// Deformation at the quadrature points; `None` where a point is inverted or the projected dilatation is not positive.
+    /// Deformation at the quadrature points; whether no point is inverted and the projected dilatation positive everywhere.
     #[inline(always)]
-    fn points(&self, local: &Local) -> Option<Points> {
-        let mut out = Points {
-            f: self.geometry.deformation_gradients(local.group, local.current),
-            f_inverse_transposed: [Matrix3::identity(); POINTS],
-            j: [1.0; POINTS],
-            theta: [1.0; POINTS],
-        };
-        for q in 0..POINTS {
-            let (j, cofactor) = determinant_and_cofactor(&out.f[q]);
-            if j.is_nan() || j <= 0.0 {
-                return None;
+    fn measure(&self, local: &Local, out: &mut Points) -> bool {
+        self.geometry.deformation_gradients(local.group, local.current, &mut out.f);
+        determinants_and_cofactors(&out.f, &mut out.j, &mut out.f_inverse_transposed);
+        let mut inverse = [0.0; PLACES];
+        let mut upright = true;
+        for q in 0..PLACES {
+            inverse[q] = 1.0 / out.j[q];
+            // Not a number is not positive either.
+            upright &= out.j[q] > 0.0;
+        }
+        for row in &mut out.f_inverse_transposed {
+            for entries in row {
+                for q in 0..PLACES {
+                    entries[q] *= inverse[q];
+                }
             }
-            out.j[q] = j;
-            out.f_inverse_transposed[q] = cofactor / j;
         }
         out.theta = self.geometry.project(local.group, &out.j);
-        out.theta.iter().all(|&t| t > 0.0).then_some(out)
+        for theta in &out.theta[..POINTS] {
+            upright &= *theta > 0.0;
+        }
+        upright
     }
 
     /// U, U′ and U″ of the volumetric energy at the projected dilatation.
@@ -103,8 +127,8 @@ impl FiniteStrain<'_> {
 
     /// The projected pressure π at every point.
     #[inline(always)]
-    fn pressure(&self, local: &Local, points: &Points) -> [f64; POINTS] {
-        let mut pressure = [0.0; POINTS];
+    fn pressure(&self, local: &Local, points: &Points) -> PointNumbers {
+        let mut pressure = [0.0; PLACES];
         for q in 0..POINTS {
             pressure[q] = self.volumetric(&self.materials[local.group], points.theta[q]).1;
         }
@@ -118,7 +142,7 @@ impl FiniteStrain<'_> {
         let rows = out.as_chunks_mut::<NODES>().0;
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
             let mut pushed = [[[0.0; NODES]; POINTS]; 3];
-            push_forward(&points.f[q], self.geometry.gradients(local.group, q), q, &mut pushed);
+            push_forward(&matrix_at(&points.f, q), self.geometry.gradients(local.group, q), q, &mut pushed);
             let scale = -2.0 / 3.0 * weight * mu * points.j[q].powf(-2.0 / 3.0);
             for i in 0..3 {
                 for a in 0..NODES {
@@ -136,19 +160,25 @@ impl FiniteStrain<'_> {
     /// Projected pressure at the points after `step`, to first order: U′(θ) + U″(θ) dθ with dJ = J F⁻ᵀ : dF.
     #[inline(always)]
     fn predict_pressure_n(&self, local: &Local, step: &[f64], out: &mut [f64]) {
-        let Some(points) = self.points(local) else { return };
-        let moved = self.geometry.deformation_gradients(local.group, step);
-        let mut change = [0.0; POINTS];
-        for q in 0..POINTS {
-            change[q] = points.j[q] * points.f_inverse_transposed[q].dot(&moved[q]);
+        let mut points = Points::REST;
+        if !self.measure(local, &mut points) {
+            return;
+        }
+        let mut moved = IDENTITIES;
+        self.geometry.deformation_gradients(local.group, step, &mut moved);
+        let mut change = [0.0; PLACES];
+        for (inverse, moved) in points.f_inverse_transposed.as_flattened().iter().zip(moved.as_flattened()) {
+            for q in 0..PLACES {
+                change[q] += points.j[q] * inverse[q] * moved[q];
+            }
         }
         let change = self.geometry.project(local.group, &change);
-        let mut pressure = [0.0; POINTS];
+        let mut pressure = [0.0; PLACES];
         for q in 0..POINTS {
             let (_, first, second) = self.volumetric(&self.materials[local.group], points.theta[q]);
             pressure[q] = first + second * change[q];
         }
-        out.copy_from_slice(&self.geometry.project(local.group, &pressure));
+        out.copy_from_slice(&self.geometry.project(local.group, &pressure)[..POINTS]);
     }
 }
 
@@ -166,14 +196,17 @@ impl Kernel for PredictStress<'_> {
 impl SolidEnergy for FiniteStrain<'_> {
     #[inline(always)]
     fn energy_n(&self, local: &Local) -> f64 {
-        let Some(points) = self.points(local) else { return f64::INFINITY };
+        let mut points = Points::REST;
+        if !self.measure(local, &mut points) {
+            return f64::INFINITY;
+        }
         let material = &self.materials[local.group];
+        let squared = points.squared_stretches();
         let mut energy = 0.0;
         for (q, weight) in self.geometry.weights(local.group).iter().enumerate() {
-            let i1 = points.f[q].norm_squared();
             let deviatoric = match self.law {
-                NeoHookean::Logarithmic => 0.5 * material.mu * (i1 - 3.0) - material.mu * points.j[q].ln(),
-                NeoHookean::Isochoric => 0.5 * material.mu * (points.j[q].powf(-2.0 / 3.0) * i1 - 3.0),
+                NeoHookean::Logarithmic => 0.5 * material.mu * (squared[q] - 3.0) - material.mu * points.j[q].ln(),
+                NeoHookean::Isochoric => 0.5 * material.mu * (points.j[q].powf(-2.0 / 3.0) * squared[q] - 3.0),
             };
             energy += weight * (deviatoric + self.volumetric(material, points.theta[q]).0);
         }
@@ -182,47 +215,71 @@ impl SolidEnergy for FiniteStrain<'_> {
 
     #[inline(always)]
     fn add_gradient_n(&self, local: &Local, out: &mut [f64]) {
-        let Some(points) = self.points(local) else {
+        let mut points = Points::REST;
+        if !self.measure(local, &mut points) {
             out.fill(f64::NAN);
             return;
-        };
+        }
         let pressure = self.pressure(local, &points);
         let mu = self.materials[local.group].mu;
-        let mut stress = [Matrix3::zeros(); POINTS];
-        for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
-            let (f, inverse, j) = (&points.f[q], &points.f_inverse_transposed[q], points.j[q]);
-            let pointwise = match self.law {
-                NeoHookean::Logarithmic => (f - inverse) * mu,
-                NeoHookean::Isochoric => (f - inverse * (f.norm_squared() / 3.0)) * (mu * j.powf(-2.0 / 3.0)),
-            };
-            stress[q] = (pointwise + inverse * (pressure[q] * j)) * weight;
+        let weights = self.geometry.weights_in_places(local.group);
+        // The stress is a F + b F⁻ᵀ.
+        let (mut a, mut b) = ([0.0; PLACES], [0.0; PLACES]);
+        match self.law {
+            NeoHookean::Logarithmic => {
+                for q in 0..PLACES {
+                    a[q] = weights[q] * mu;
+                    b[q] = weights[q] * (pressure[q] * points.j[q] - mu);
+                }
+            }
+            NeoHookean::Isochoric => {
+                let squared = points.squared_stretches();
+                for q in 0..PLACES {
+                    a[q] = weights[q] * mu * points.j[q].powf(-2.0 / 3.0);
+                    b[q] = weights[q] * pressure[q] * points.j[q] - a[q] * squared[q] / 3.0;
+                }
+            }
+        }
+        let mut stress = IDENTITIES;
+        for i in 0..3 {
+            for k in 0..3 {
+                let (f, inverse) = (&points.f[i][k], &points.f_inverse_transposed[i][k]);
+                for q in 0..PLACES {
+                    stress[i][k][q] = a[q].mul_add(f[q], b[q] * inverse[q]);
+                }
+            }
         }
         self.geometry.add_force(local.group, &stress, out);
     }
 
     #[inline(always)]
     fn add_hessian_n(&self, local: &Local, out: &mut [f64]) {
-        let Some(points) = self.points(local) else { return };
-        let mut pressure = [0.0; POINTS];
+        let mut points = Points::REST;
+        if !self.measure(local, &mut points) {
+            return;
+        }
+        let mut pressure = [0.0; PLACES];
         if local.predicted.is_empty() {
             pressure = self.pressure(local, &points);
         } else {
-            pressure.copy_from_slice(local.predicted);
+            pressure[..POINTS].copy_from_slice(local.predicted);
         }
         let material = &self.materials[local.group];
         let mut spatial = [[[0.0; NODES]; POINTS]; 3];
         let mut coefficients = StiffnessCoefficients::ZERO;
-        let mut volumetric = Volumetric { dilatation: points.j, stiffness: [0.0; POINTS] };
+        let mut volumetric = Volumetric { dilatation: [0.0; POINTS], stiffness: [0.0; POINTS] };
+        let squared = points.squared_stretches();
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
             let rest = self.geometry.gradients(local.group, q);
-            push_forward(&points.f_inverse_transposed[q], rest, q, &mut spatial);
+            push_forward(&matrix_at(&points.f_inverse_transposed, q), rest, q, &mut spatial);
             let j = points.j[q];
+            volumetric.dilatation[q] = j;
             let pj = pressure[q] * j;
             let (rest, cross, outer) = match self.law {
                 NeoHookean::Logarithmic => (material.mu, material.mu - pj, pj),
                 NeoHookean::Isochoric => {
                     let scaled = material.mu * j.powf(-2.0 / 3.0);
-                    let i1 = points.f[q].norm_squared();
+                    let i1 = squared[q];
                     (scaled, scaled * i1 / 3.0 - pj, scaled * i1 * 2.0 / 9.0 + pj)
                 }
             };

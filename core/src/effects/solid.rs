@@ -7,15 +7,21 @@
 //! Loops have compile-time lengths and run under the widest vector instructions of the machine (`run_kernel`).
 //! Not here: any material, any mesh topology.
 
+pub(super) mod points;
 pub(super) mod products;
 mod stiffness;
 
-use nalgebra::{Matrix3, Matrix4, Vector4};
+use std::sync::LazyLock;
+
+use nalgebra::{Matrix3, Matrix4};
 use thiserror::Error;
 
 use crate::effect::{Local, Stencils};
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, run_kernel};
 use crate::mesh::element::{FACE_NODES, MODES, NODES, POINTS, QUADRATURE};
+use points::{
+    IDENTITIES, MODE_VALUES, NodeGradients, PLACES, PointNumbers, determinants_and_cofactors, gradients_of, matrix_at,
+};
 pub use stiffness::{PointRows, StiffnessCoefficients, Volumetric};
 
 /// One number per node for each component: a row of shape function gradients.
@@ -69,10 +75,10 @@ impl Base {
 pub struct SolidGeometry {
     /// ∂N/∂X (1/mm), indexed (element, point).
     gradients: Vec<NodeRows>,
-    /// Quadrature weight × rest Jacobian (mm³), indexed (element, point).
-    weights: Vec<f64>,
-    /// Pressure modes at the quadrature points of the reference element.
-    mode_values: [[f64; MODES]; POINTS],
+    /// The same, for each element the points side by side.
+    by_node: Vec<NodeGradients>,
+    /// Quadrature weight × rest Jacobian (mm³) of each element's points.
+    weights: Vec<PointNumbers>,
     /// Inverse of the rest-volume mass matrix of the pressure modes (1/mm³), one per element.
     mode_inverse: Vec<Matrix4<f64>>,
     /// Base of each element; none: all are free.
@@ -85,38 +91,20 @@ impl SolidGeometry {
     /// # Errors
     /// If an element is inverted or flat at rest.
     pub fn new(stencils: &Stencils, rest: &[f64]) -> Result<Self, SolidGeometryError> {
-        let reference = &*QUADRATURE;
         let elements = stencils.len();
-        let mut gradients = Vec::with_capacity(elements * POINTS);
-        let mut weights = Vec::with_capacity(elements * POINTS);
-        let mut mode_inverse = Vec::with_capacity(elements);
+        let mut geometry = SolidGeometry {
+            gradients: vec![[[0.0; NODES]; 3]; elements * POINTS],
+            by_node: vec![[[[0.0; PLACES]; NODES]; 3]; elements],
+            weights: vec![[0.0; PLACES]; elements],
+            mode_inverse: vec![Matrix4::zeros(); elements],
+            bases: Vec::new(),
+        };
         let mut local = [0.0; 3 * NODES];
         for element in 0..elements {
             stencils.gather(element, rest, &mut local);
-            let mut mass = Matrix4::zeros();
-            for (index, point) in reference.iter().enumerate() {
-                let jacobian = Matrix3::from_fn(|i, k| {
-                    (0..NODES).map(|a| local[i * NODES + a] * point.shapes[a].gradient[k]).sum()
-                });
-                let determinant = jacobian.determinant();
-                let inverted = SolidGeometryError::Inverted { element, point: index, jacobian: determinant };
-                let inverse = jacobian.try_inverse().filter(|_| determinant > 0.0).ok_or(inverted)?;
-                gradients.push([0, 1, 2].map(|k| {
-                    let row = point.shapes.map(|s| s.gradient);
-                    row.map(|g| (0..3).map(|l| g[l] * inverse[(l, k)]).sum::<f64>())
-                }));
-                let weight = point.weight * determinant;
-                weights.push(weight);
-                mass += Matrix4::from_fn(|i, j| weight * point.modes[i] * point.modes[j]);
-            }
-            let inverted = SolidGeometryError::Inverted { element, point: 0, jacobian: mass[(0, 0)] };
-            mode_inverse.push(mass.try_inverse().ok_or(inverted)?);
+            run_kernel(Measure { geometry: &mut geometry, element, rest: &local })?;
         }
-        let mut mode_values = [[0.0; MODES]; POINTS];
-        for (values, point) in mode_values.iter_mut().zip(reference.iter()) {
-            *values = point.modes;
-        }
-        Ok(SolidGeometry { gradients, weights, mode_values, mode_inverse, bases: Vec::new() })
+        Ok(geometry)
     }
 
     /// The same with what each element stands on.
@@ -144,39 +132,31 @@ impl SolidGeometry {
     /// Quadrature weights × rest Jacobian of one element (mm³).
     #[inline(always)]
     pub fn weights(&self, element: usize) -> &[f64] {
-        &self.weights[element * POINTS..(element + 1) * POINTS]
+        &self.weights[element][..POINTS]
+    }
+
+    /// The same, zero in the places beyond the last point.
+    #[inline(always)]
+    pub(super) fn weights_in_places(&self, element: usize) -> &PointNumbers {
+        &self.weights[element]
     }
 
     /// Deformation gradient F = Σ xₐ ⊗ Gₐ at one point.
-    #[inline(always)]
     pub fn deformation_gradient(&self, element: usize, point: usize, current: &[f64]) -> Matrix3<f64> {
-        summed(&products_in_parts(current, self.gradients(element, point)))
-    }
-
-    /// The same at every point of an element.
-    #[inline(always)]
-    pub fn deformation_gradients(&self, element: usize, current: &[f64]) -> [Matrix3<f64>; POINTS] {
-        // The parts are added up in a loop of their own: in one with the products, the compiler packs entries and not parts.
-        let mut parts = [[[[0.0; LANES]; 3]; 3]; POINTS];
-        for (q, parts) in parts.iter_mut().enumerate() {
-            *parts = products_in_parts(current, self.gradients(element, q));
-        }
-        // Loops and not `map`: a closure that is not inlined would leave the vector instructions behind.
-        let mut f = [Matrix3::zeros(); POINTS];
-        for (f, parts) in f.iter_mut().zip(&parts) {
-            *f = summed(parts);
-        }
-        f
+        let gradients = self.gradients(element, point);
+        Matrix3::from_fn(|i, k| (0..NODES).map(|a| current[i * NODES + a] * gradients[k][a]).sum())
     }
 
     /// The largest t such that no point's J falls below a tenth of its value along `current + t step`.
     #[inline(always)]
     pub(super) fn max_step(&self, local: &Local, step: &[f64]) -> f64 {
         let mut largest = 1.0_f64;
-        let now = self.deformation_gradients(local.group, local.current);
-        let change = self.deformation_gradients(local.group, step);
-        for (f, df) in now.iter().zip(&change) {
-            let (j, _) = determinant_and_cofactor(f);
+        let (mut now, mut change) = (IDENTITIES, IDENTITIES);
+        self.deformation_gradients(local.group, local.current, &mut now);
+        self.deformation_gradients(local.group, step, &mut change);
+        for q in 0..POINTS {
+            let (f, df) = (matrix_at(&now, q), matrix_at(&change, q));
+            let (j, _) = determinant_and_cofactor(&f);
             while largest > f64::EPSILON && determinant_and_cofactor(&(f + df * largest)).0 <= SMALLEST_VOLUME_RATIO * j
             {
                 largest *= 0.7;
@@ -184,84 +164,82 @@ impl SolidGeometry {
         }
         largest
     }
+}
 
-    /// Projects point values on the pressure modes and back: the value of the projection at every point.
-    ///
-    /// With M the mass matrix of the modes this is φ(q)·M⁻¹ Σ_r w_r φ(r) v_r, which keeps ∫v.
-    #[inline(always)]
-    pub fn project(&self, element: usize, values: &[f64; POINTS]) -> [f64; POINTS] {
-        let coefficients = self.mode_inverse[element] * self.mode_integral(element, values);
-        let mut out = [0.0; POINTS];
-        for (value, modes) in out.iter_mut().zip(&self.mode_values) {
-            *value = (0..MODES).map(|m| modes[m] * coefficients[m]).sum();
-        }
-        out
-    }
+/// The kernel of [`SolidGeometry::new`]: one element.
+struct Measure<'a> {
+    geometry: &'a mut SolidGeometry,
+    element: usize,
+    rest: &'a [f64],
+}
 
-    /// ∫ v φₘ over the element, for each pressure mode.
-    #[inline(always)]
-    fn mode_integral(&self, element: usize, values: &[f64; POINTS]) -> Vector4<f64> {
-        let mut integral = Vector4::zeros();
-        for ((value, weight), modes) in values.iter().zip(self.weights(element)).zip(&self.mode_values) {
-            for m in 0..MODES {
-                integral[m] += weight * value * modes[m];
+/// Gradients of the shape functions on the reference element.
+static REFERENCE_GRADIENTS: LazyLock<NodeGradients> = LazyLock::new(|| {
+    let mut gradients = [[[0.0; PLACES]; NODES]; 3];
+    for (q, point) in QUADRATURE.iter().enumerate() {
+        for (a, shape) in point.shapes.iter().enumerate() {
+            for k in 0..3 {
+                gradients[k][a][q] = shape.gradient[k];
             }
         }
-        integral
     }
+    gradients
+});
 
-    /// Adds Σ_q Gᵀ·stress: `stress[q]` is the first Piola–Kirchhoff stress times the quadrature weight (mN·mm).
+impl Kernel for Measure<'_> {
+    type Output = Result<(), SolidGeometryError>;
+
     #[inline(always)]
-    pub fn add_force(&self, element: usize, stress: &[Matrix3<f64>; POINTS], out: &mut [f64]) {
-        let rows = out.as_chunks_mut::<NODES>().0;
-        for chunk in 0..NODES / LANES {
-            let mut sum = [0, 1, 2].map(|i: usize| rows[i].as_chunks::<LANES>().0[chunk]);
-            for (q, p) in stress.iter().enumerate() {
-                let gradients = self.gradients(element, q);
-                let g = [0, 1, 2].map(|k: usize| gradients[k].as_chunks::<LANES>().0[chunk]);
-                for i in 0..3 {
-                    for lane in 0..LANES {
-                        sum[i][lane] += p[(i, 0)] * g[0][lane] + p[(i, 1)] * g[1][lane] + p[(i, 2)] * g[2][lane];
+    fn run(self) -> Self::Output {
+        let Measure { geometry, element, rest } = self;
+        let reference = &*REFERENCE_GRADIENTS;
+        let (mut jacobian, mut inverse_transposed) = (IDENTITIES, IDENTITIES);
+        gradients_of(rest, reference, &mut jacobian);
+        let mut determinant = [0.0; PLACES];
+        determinants_and_cofactors(&jacobian, &mut determinant, &mut inverse_transposed);
+        for (point, &jacobian) in determinant[..POINTS].iter().enumerate() {
+            if jacobian.is_nan() || jacobian <= 0.0 {
+                return Err(SolidGeometryError::Inverted { element, point, jacobian });
+            }
+        }
+        let weights = &mut geometry.weights[element];
+        for (q, point) in QUADRATURE.iter().enumerate() {
+            weights[q] = point.weight * determinant[q];
+        }
+        let by_node = &mut geometry.by_node[element];
+        for k in 0..3 {
+            for l in 0..3 {
+                let mut inverse = [0.0; PLACES];
+                for q in 0..PLACES {
+                    inverse[q] = inverse_transposed[k][l][q] / determinant[q];
+                }
+                for a in 0..NODES {
+                    for q in 0..PLACES {
+                        by_node[k][a][q] += reference[l][a][q] * inverse[q];
                     }
                 }
             }
-            for i in 0..3 {
-                rows[i].as_chunks_mut::<LANES>().0[chunk] = sum[i];
-            }
         }
-    }
-}
-
-/// Products of each component of the nodes' positions with each of their gradients' at one point, added up in four interleaved parts.
-#[inline(always)]
-fn products_in_parts(current: &[f64], gradients: &NodeRows) -> [[[f64; LANES]; 3]; 3] {
-    let position = current.as_chunks::<NODES>().0;
-    let mut sum = [[[0.0; LANES]; 3]; 3];
-    for chunk in 0..NODES / LANES {
-        for i in 0..3 {
+        for (q, rows) in geometry.gradients[element * POINTS..][..POINTS].iter_mut().enumerate() {
             for k in 0..3 {
-                let x = &position[i].as_chunks::<LANES>().0[chunk];
-                let g = &gradients[k].as_chunks::<LANES>().0[chunk];
-                for lane in 0..LANES {
-                    sum[i][k][lane] += x[lane] * g[lane];
+                for a in 0..NODES {
+                    rows[k][a] = by_node[k][a][q];
                 }
             }
         }
-    }
-    sum
-}
-
-/// The sum of the parts.
-#[inline(always)]
-fn summed(parts: &[[[f64; LANES]; 3]; 3]) -> Matrix3<f64> {
-    let mut f = Matrix3::zeros();
-    for i in 0..3 {
-        for k in 0..3 {
-            let part = &parts[i][k];
-            f[(i, k)] = (part[0] + part[1]) + (part[2] + part[3]);
+        let modes = &*MODE_VALUES;
+        let mut mass = Matrix4::zeros();
+        for i in 0..MODES {
+            for j in 0..MODES {
+                for q in 0..PLACES {
+                    mass[(i, j)] += weights[q] * modes[i][q] * modes[j][q];
+                }
+            }
         }
+        let inverted = SolidGeometryError::Inverted { element, point: 0, jacobian: mass[(0, 0)] };
+        geometry.mode_inverse[element] = mass.try_inverse().ok_or(inverted)?;
+        Ok(())
     }
-    f
 }
 
 /// Determinant of a 3 × 3 matrix and its cofactor matrix J F⁻ᵀ.

@@ -16,6 +16,7 @@
 
 use nalgebra::Matrix3;
 
+use super::solid::points::{IDENTITIES, matrix_at, put_matrix};
 use super::solid::products::{Products, add_products};
 use super::solid::{
     Energy, Gradient, Hessian, MaxStep, SolidEnergy, SolidGeometry, StiffnessCoefficients, determinant_and_cofactor,
@@ -193,8 +194,10 @@ impl Viscoelasticity<'_> {
     #[allow(clippy::type_complexity)]
     fn points(&self, local: &Local) -> Option<([Matrix3<f64>; POINTS], [Matrix3<f64>; POINTS], [f64; POINTS])> {
         let mut out = ([Matrix3::identity(); POINTS], [Matrix3::identity(); POINTS], [1.0; POINTS]);
+        let mut gradients = IDENTITIES;
+        self.geometry.deformation_gradients(local.group, local.current, &mut gradients);
         for q in 0..POINTS {
-            let f = self.geometry.deformation_gradient(local.group, q, local.current);
+            let f = matrix_at(&gradients, q);
             let (j, cofactor) = determinant_and_cofactor(&f);
             if j.is_nan() || j <= 0.0 {
                 return None;
@@ -228,10 +231,11 @@ impl SolidEnergy for Viscoelasticity<'_> {
             out.fill(f64::NAN);
             return;
         };
-        let mut stress = [Matrix3::zeros(); POINTS];
+        let mut stress = IDENTITIES;
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
             let scale = weight * self.shear_kpa[local.group];
-            stress[q] = (f[q] * self.pull(local.group, q) - inverse[q] * self.barrier) * scale;
+            let at = f[q] * self.pull(local.group, q) - inverse[q] * self.barrier;
+            put_matrix(&mut stress, q, &(at * scale));
         }
         self.geometry.add_force(local.group, &stress, out);
     }

@@ -4,6 +4,7 @@
 
 use nalgebra::Matrix4;
 
+use super::points::MODE_VALUES;
 use super::products::{Products, add_products, add_symmetric_products};
 use super::{LANES, SolidGeometry};
 use crate::effect::LOWER_BLOCKS;
@@ -88,9 +89,11 @@ impl SolidGeometry {
                 add_products(base, [of_cross, of_outer, of_modes], &mut block);
             }
             for (a, block) in block.iter().enumerate().skip(base.nodes()) {
-                let row = &mut rows[(i * NODES + a) * 3 + j];
-                for b in 0..NODES {
-                    row[b] += block[b];
+                let row = rows[(i * NODES + a) * 3 + j].as_chunks_mut::<LANES>().0;
+                for (row, block) in row.iter_mut().zip(block.as_chunks::<LANES>().0) {
+                    for lane in 0..LANES {
+                        row[lane] += block[lane];
+                    }
                 }
             }
         }
@@ -106,10 +109,11 @@ impl SolidGeometry {
         volumetric: &Volumetric,
     ) -> [[[[f64; NODES]; MODES]; 3]; 2] {
         let mut core = Matrix4::zeros();
-        for (stiffness, modes) in volumetric.stiffness.iter().zip(&self.mode_values) {
-            for m in 0..MODES {
-                for l in 0..MODES {
-                    core[(m, l)] += stiffness * modes[m] * modes[l];
+        let modes = &*MODE_VALUES;
+        for m in 0..MODES {
+            for l in 0..MODES {
+                for (q, stiffness) in volumetric.stiffness.iter().enumerate() {
+                    core[(m, l)] += stiffness * modes[m][q] * modes[l][q];
                 }
             }
         }
@@ -117,7 +121,7 @@ impl SolidGeometry {
         let mut scales = [[0.0; MODES]; POINTS];
         for (q, weight) in self.weights(element).iter().enumerate() {
             for m in 0..MODES {
-                scales[q][m] = weight * volumetric.dilatation[q] * self.mode_values[q][m];
+                scales[q][m] = weight * volumetric.dilatation[q] * modes[m][q];
             }
         }
         let (mut integrals, mut scaled) = ([[[0.0; NODES]; MODES]; 3], [[[0.0; NODES]; MODES]; 3]);

@@ -1,0 +1,164 @@
+//! Numbers and matrices at an element's quadrature points, side by side: loops over the points become vector instructions.
+//!
+//! Fourteen points do not fill whole vectors; in the places beyond the last one a matrix is the identity and a weight zero, so that what is computed there
+//! is finite and counts for nothing.
+
+use std::sync::LazyLock;
+
+use nalgebra::{Matrix3, Vector4};
+
+use super::{LANES, SolidGeometry};
+use crate::mesh::element::{MODES, NODES, POINTS, QUADRATURE};
+
+/// Places for the points of an element.
+pub(in crate::effects) const PLACES: usize = POINTS.next_multiple_of(LANES);
+
+/// A number at each point.
+pub(in crate::effects) type PointNumbers = [f64; PLACES];
+
+/// A 3 × 3 matrix at each point, indexed (row, column, point).
+pub(in crate::effects) type PointMatrices = [[PointNumbers; 3]; 3];
+
+/// Gradients of the shape functions, indexed (component, node, point).
+pub(in crate::effects) type NodeGradients = [[PointNumbers; NODES]; 3];
+
+/// The same matrix everywhere.
+pub(in crate::effects) const IDENTITIES: PointMatrices = {
+    let (one, zero) = ([1.0; PLACES], [0.0; PLACES]);
+    [[one, zero, zero], [zero, one, zero], [zero, zero, one]]
+};
+
+/// Pressure modes of the reference element, indexed (mode, point).
+pub(super) static MODE_VALUES: LazyLock<[PointNumbers; MODES]> = LazyLock::new(|| {
+    let mut values = [[0.0; PLACES]; MODES];
+    for (q, point) in QUADRATURE.iter().enumerate() {
+        for m in 0..MODES {
+            values[m][q] = point.modes[m];
+        }
+    }
+    values
+});
+
+/// The matrix at one point.
+#[inline(always)]
+pub(in crate::effects) fn matrix_at(matrices: &PointMatrices, point: usize) -> Matrix3<f64> {
+    let row = |i: usize| [matrices[i][0][point], matrices[i][1][point], matrices[i][2][point]];
+    let ([a, b, c], [d, e, f], [g, h, i]) = (row(0), row(1), row(2));
+    Matrix3::new(a, b, c, d, e, f, g, h, i)
+}
+
+/// Puts a matrix at one point.
+#[inline(always)]
+pub(in crate::effects) fn put_matrix(matrices: &mut PointMatrices, point: usize, matrix: &Matrix3<f64>) {
+    for i in 0..3 {
+        for k in 0..3 {
+            matrices[i][k][point] = matrix[(i, k)];
+        }
+    }
+}
+
+/// Σ xₐ ⊗ Gₐ over the nodes at every point, for `current` positions x (component-major).
+#[inline(always)]
+pub(super) fn gradients_of(current: &[f64], gradients: &NodeGradients, out: &mut PointMatrices) {
+    let position = current.as_chunks::<NODES>().0;
+    *out = IDENTITIES;
+    for k in 0..3 {
+        let mut sums = [[0.0; PLACES]; 3];
+        for a in 0..NODES {
+            let gradient = &gradients[k][a];
+            for i in 0..3 {
+                for q in 0..PLACES {
+                    sums[i][q] = position[i][a].mul_add(gradient[q], sums[i][q]);
+                }
+            }
+        }
+        for i in 0..3 {
+            out[i][k][..POINTS].copy_from_slice(&sums[i][..POINTS]);
+        }
+    }
+}
+
+/// Determinants J of 3 × 3 matrices F and their cofactor matrices J F⁻ᵀ.
+#[inline(always)]
+pub(in crate::effects) fn determinants_and_cofactors(
+    f: &PointMatrices,
+    determinants: &mut PointNumbers,
+    cofactors: &mut PointMatrices,
+) {
+    for i in 0..3 {
+        for k in 0..3 {
+            let ([i1, i2], [k1, k2]) = ([(i + 1) % 3, (i + 2) % 3], [(k + 1) % 3, (k + 2) % 3]);
+            for q in 0..PLACES {
+                cofactors[i][k][q] = f[i1][k1][q] * f[i2][k2][q] - f[i2][k1][q] * f[i1][k2][q];
+            }
+        }
+    }
+    for q in 0..PLACES {
+        let column =
+            [f[0][0][q] * cofactors[0][0][q], f[1][0][q] * cofactors[1][0][q], f[2][0][q] * cofactors[2][0][q]];
+        determinants[q] = column[0] + column[1] + column[2];
+    }
+}
+
+impl SolidGeometry {
+    /// Deformation gradients F = Σ xₐ ⊗ Gₐ at the points of an element.
+    #[inline(always)]
+    pub(in crate::effects) fn deformation_gradients(&self, element: usize, current: &[f64], out: &mut PointMatrices) {
+        gradients_of(current, &self.by_node[element], out);
+    }
+
+    /// Projects point values on the pressure modes and back: the value of the projection at every point, zero beyond the last.
+    ///
+    /// With M the mass matrix of the modes this is φ(q)·M⁻¹ Σ_r w_r φ(r) v_r, which keeps ∫v.
+    #[inline(always)]
+    pub(in crate::effects) fn project(&self, element: usize, values: &PointNumbers) -> PointNumbers {
+        let (modes, weights) = (&*MODE_VALUES, &self.weights[element]);
+        let mut parts = [[0.0; LANES]; MODES];
+        for first in (0..PLACES).step_by(LANES) {
+            for m in 0..MODES {
+                for lane in 0..LANES {
+                    let q = first + lane;
+                    parts[m][lane] += weights[q] * values[q] * modes[m][q];
+                }
+            }
+        }
+        let mut integral = Vector4::zeros();
+        for (integral, parts) in integral.iter_mut().zip(&parts) {
+            *integral = (parts[0] + parts[1]) + (parts[2] + parts[3]);
+        }
+        let coefficients = self.mode_inverse[element] * integral;
+        let mut out = [0.0; PLACES];
+        for m in 0..MODES {
+            for q in 0..PLACES {
+                out[q] += modes[m][q] * coefficients[m];
+            }
+        }
+        out
+    }
+
+    /// Adds Σ_q Gᵀ·stress: `stress` is the first Piola–Kirchhoff stress times the quadrature weight (mN·mm). What belongs to a base that does not move is left out.
+    #[inline(always)]
+    pub(in crate::effects) fn add_force(&self, element: usize, stress: &PointMatrices, out: &mut [f64]) {
+        let rows = out.as_chunks_mut::<NODES>().0;
+        for chunk in self.base(element).nodes() / LANES..NODES / LANES {
+            let mut sum = [[0.0; LANES]; 3];
+            for q in 0..POINTS {
+                let gradients = self.gradients(element, q);
+                for k in 0..3 {
+                    let gradient = &gradients[k].as_chunks::<LANES>().0[chunk];
+                    for i in 0..3 {
+                        for lane in 0..LANES {
+                            sum[i][lane] = stress[i][k][q].mul_add(gradient[lane], sum[i][lane]);
+                        }
+                    }
+                }
+            }
+            for i in 0..3 {
+                let out = &mut rows[i].as_chunks_mut::<LANES>().0[chunk];
+                for lane in 0..LANES {
+                    out[lane] += sum[i][lane];
+                }
+            }
+        }
+    }
+}
