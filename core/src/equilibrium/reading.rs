@@ -1,7 +1,5 @@
 //! What is read off an equilibrium: the contact's area, pressure and penetration, and the tissue's largest strain.
 
-use nalgebra::Matrix3;
-
 use super::{ContactSummary, Strains, Wall};
 use crate::effect::{Effect, Local};
 use crate::mesh::element::{NODES, POINTS};
@@ -48,15 +46,16 @@ impl Wall<'_> {
         let mut found = Strains { max_strain: 0.0, least_volume_ratio: f64::INFINITY };
         for element in 0..stencils.len() {
             stencils.gather(element, positions, &mut local);
+            let distortion = self.geometry.solid.distortion(element, &local);
+            found.least_volume_ratio = found.least_volume_ratio.min(distortion.least_volume_ratio);
+            // Only candidates are worth eigenvalue problems.
+            if distortion.most_strain <= found.max_strain {
+                continue;
+            }
             for point in 0..POINTS {
                 let f = self.geometry.solid.deformation_gradient(element, point, &local);
-                found.least_volume_ratio = found.least_volume_ratio.min(f.determinant());
-                // |σ − 1| ≤ ‖F − 1‖ for every principal stretch σ: only candidates are worth an eigenvalue problem.
-                if (f - Matrix3::identity()).norm() > found.max_strain {
-                    let stretches =
-                        (f.transpose() * f).symmetric_eigenvalues().map(|l| (l.max(0.0).sqrt() - 1.0).abs());
-                    found.max_strain = found.max_strain.max(stretches.max());
-                }
+                let stretches = (f.transpose() * f).symmetric_eigenvalues().map(|l| (l.max(0.0).sqrt() - 1.0).abs());
+                found.max_strain = found.max_strain.max(stretches.max());
             }
         }
         found

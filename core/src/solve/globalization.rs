@@ -29,13 +29,24 @@ pub(super) struct Trial {
     start: Vec<f64>,
     /// Π at the last accepted positions; used by the line search alone.
     potential: f64,
-    /// The last step in the layout of positions.
-    moved: Vec<f64>,
-    /// Predicted stresses.
+    /// Predicted stresses, as of the step before the last one if that is still to be used.
     predicted: Predicted,
+    /// The last step, if stresses are to be predicted from it: only another iteration needs them.
+    last: Option<Taken>,
     drive: Drive,
     globalization: Globalization,
     force_scale_mn: f64,
+}
+
+/// A step that was taken.
+#[derive(Clone)]
+struct Taken {
+    /// Positions before it.
+    from: Vec<f64>,
+    /// It, in the layout of positions.
+    moved: Vec<f64>,
+    /// Positions after it, if it met the effects on the tail as they are there.
+    met: Option<Vec<f64>>,
 }
 
 /// A Newton step, not yet taken.
@@ -106,8 +117,8 @@ impl Trial {
         Trial {
             start: positions.to_vec(),
             potential,
-            moved: vec![0.0; positions.len()],
             predicted,
+            last: None,
             drive,
             globalization,
             force_scale_mn: settings.force_scale_mn,
@@ -131,6 +142,12 @@ impl System<'_> {
         workspace: &mut Workspace,
     ) -> Result<usize, NewtonError> {
         workspace.responses = None;
+        if let Some(Taken { from, moved, met }) = trial.last.take() {
+            predict_stress(self.terms, &from, &moved, &mut workspace.scratch, &mut trial.predicted);
+            if let Some(met) = met {
+                self.keep_tail_stresses(&met, &mut trial.predicted, workspace);
+            }
+        }
         if trial.globalization == Globalization::LineSearch {
             hessian(
                 self.terms,
@@ -266,12 +283,10 @@ impl System<'_> {
                 trial.predicted.clear();
                 return Some((halvings, residual_mn));
             }
-            trial.moved.fill(0.0);
-            self.dofs.advance(&mut trial.moved, &step.step, scale);
-            predict_stress(self.terms, &before, &trial.moved, &mut workspace.scratch, &mut trial.predicted);
-            if step.refined && halvings == 0 {
-                self.keep_tail_stresses(positions, &mut trial.predicted, workspace);
-            }
+            let mut moved = vec![0.0; positions.len()];
+            self.dofs.advance(&mut moved, &step.step, scale);
+            let met = (step.refined && halvings == 0).then(|| positions.to_vec());
+            trial.last = Some(Taken { from: before, moved, met });
             return Some((halvings, residual_mn));
         }
         None
@@ -286,9 +301,9 @@ impl System<'_> {
         workspace: &mut Workspace,
     ) -> Option<(usize, f64)> {
         let before = positions.to_vec();
-        trial.moved.fill(0.0);
-        self.dofs.advance(&mut trial.moved, &step.step, 1.0);
-        let longest = max_step(self.terms, &before, &trial.moved, &mut workspace.scratch);
+        let mut moved = vec![0.0; positions.len()];
+        self.dofs.advance(&mut moved, &step.step, 1.0);
+        let longest = max_step(self.terms, &before, &moved, &mut workspace.scratch);
         let noise = ENERGY_ROUNDOFF * trial.potential.abs();
         for halvings in 0..MAX_HALVINGS {
             let scale = longest * 0.5_f64.powi(halvings as i32);

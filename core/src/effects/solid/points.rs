@@ -8,6 +8,7 @@ use std::sync::LazyLock;
 use nalgebra::{Matrix3, Vector4};
 
 use super::{LANES, SolidGeometry};
+use crate::kernel::{Kernel, run_kernel};
 use crate::mesh::element::{MODES, NODES, POINTS, QUADRATURE};
 
 /// Places for the points of an element.
@@ -160,5 +161,47 @@ impl SolidGeometry {
                 }
             }
         }
+    }
+}
+
+/// How far an element is from its rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distortion {
+    /// Smallest volume over that at rest, J, at a point.
+    pub least_volume_ratio: f64,
+    /// Largest ‖F − 1‖ at a point: no principal stretch differs from one by more.
+    pub most_strain: f64,
+}
+
+impl SolidGeometry {
+    /// How far an element is from its rest at the positions `current` (component-major).
+    pub fn distortion(&self, element: usize, current: &[f64]) -> Distortion {
+        run_kernel(Distort { geometry: self, element, current })
+    }
+}
+
+struct Distort<'a> {
+    geometry: &'a SolidGeometry,
+    element: usize,
+    current: &'a [f64],
+}
+
+impl Kernel for Distort<'_> {
+    type Output = Distortion;
+
+    #[inline(always)]
+    fn run(self) -> Distortion {
+        let (mut f, mut cofactors, mut j) = (IDENTITIES, IDENTITIES, [1.0; PLACES]);
+        self.geometry.deformation_gradients(self.element, self.current, &mut f);
+        determinants_and_cofactors(&f, &mut j, &mut cofactors);
+        let mut squares = [0.0; PLACES];
+        for (f, rest) in f.as_flattened().iter().zip(IDENTITIES.as_flattened()) {
+            for q in 0..PLACES {
+                squares[q] += (f[q] - rest[q]) * (f[q] - rest[q]);
+            }
+        }
+        let least_volume_ratio = j[..POINTS].iter().copied().fold(f64::INFINITY, f64::min);
+        let most_strain = squares.iter().copied().fold(0.0, f64::max).sqrt();
+        Distortion { least_volume_ratio, most_strain }
     }
 }
