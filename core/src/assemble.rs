@@ -12,16 +12,14 @@ use crate::effect::{Local, Stencils, Term};
 
 /// Marks a fixed degree of freedom.
 const FIXED: u32 = u32::MAX;
-/// The border's three degrees of freedom are `BORDER`, `BORDER + 1`, `BORDER + 2`.
-const BORDER: u32 = u32::MAX - 3;
 
 /// Entries of the corner.
-const CORNER: u32 = 9;
+const CORNER: usize = 9;
 
 /// Numbering of the degrees of freedom.
 #[derive(Clone, Debug)]
 pub struct Dofs {
-    /// For each vertex and component: number of the free unknown, `BORDER + k` or `FIXED`.
+    /// For each vertex and component: its index, the border's after the free unknowns, or `FIXED`.
     of: Vec<u32>,
     /// For each unknown of the longest tail, then of the border: its place among the positions.
     tail_positions: Vec<usize>,
@@ -52,7 +50,7 @@ impl Dofs {
         }
         if let Some(vertex) = border {
             for component in 0..3 {
-                of[3 * vertex + component] = BORDER + component as u32;
+                of[3 * vertex + component] = free + component as u32;
             }
         }
         Dofs { of, tail_positions: Vec::new(), free: free as usize, tails: Vec::new() }
@@ -87,8 +85,7 @@ impl Dofs {
     pub fn index(&self, vertex: usize, component: usize) -> Option<usize> {
         match self.of[3 * vertex + component] {
             FIXED => None,
-            dof if dof >= BORDER => Some(self.free + (dof - BORDER) as usize),
-            dof => Some(dof as usize),
+            index => Some(index as usize),
         }
     }
 
@@ -130,6 +127,7 @@ impl Pattern {
     /// The pattern for effects on these stencil sets, which [`Term::set`] counts in this order.
     pub fn new(dofs: &Dofs, stencils: &[&Stencils]) -> Self {
         let free = dofs.free;
+        let border = free as u32;
         let mut columns: Vec<Vec<u32>> = vec![Vec::new(); free];
         let locals = |set: &Stencils, group: usize| -> Vec<u32> {
             let vertices = set.group(group);
@@ -137,7 +135,7 @@ impl Pattern {
         };
         for set in stencils {
             for group in 0..set.len() {
-                let mut dofs: Vec<u32> = locals(set, group).into_iter().filter(|&d| d < BORDER).collect();
+                let mut dofs: Vec<u32> = locals(set, group).into_iter().filter(|&d| d < border).collect();
                 dofs.sort_unstable();
                 for (at, &column) in dofs.iter().enumerate() {
                     columns[column as usize].extend_from_slice(&dofs[at..]);
@@ -155,29 +153,27 @@ impl Pattern {
             column_starts.push(rows.len() as u32);
         }
         let stored = rows.len() as u32;
-        let unstored = stored + 3 * free as u32 + CORNER;
-        let destination = |a: u32, b: u32| -> u32 {
+        let destination = |a: u32, b: u32| -> Option<u32> {
             let (low, high) = (a.min(b), a.max(b));
             if high == FIXED {
-                unstored
-            } else if low >= BORDER {
-                stored + 3 * free as u32 + 3 * (high - BORDER) + (low - BORDER)
-            } else if high >= BORDER {
-                stored + (high - BORDER) * free as u32 + low
+                None
+            } else if low >= border {
+                Some(stored + 3 * border + 3 * (high - border) + (low - border))
+            } else if high >= border {
+                Some(stored + (high - border) * border + low)
             } else {
-                let column = &columns[low as usize];
-                column_starts[low as usize] + column.binary_search(&high).map_or(unstored, |at| at as u32)
+                let at = columns[low as usize].binary_search(&high).ok()?;
+                Some(column_starts[low as usize] + at as u32)
             }
         };
         let of_group = |set: &Stencils, group: usize| {
             let dofs = locals(set, group);
             let lower = (0..dofs.len()).flat_map(|row| (0..=row).map(move |column| (row, column)));
             let mut list: Vec<Destination> = lower
-                .map(|(row, column)| Destination {
-                    local: (row * dofs.len() + column) as u32,
-                    value: destination(dofs[row], dofs[column]),
+                .filter_map(|(row, column)| {
+                    let value = destination(dofs[row], dofs[column])?;
+                    Some(Destination { local: (row * dofs.len() + column) as u32, value })
                 })
-                .filter(|entry| entry.value != unstored)
                 .collect();
             // The values are too many for the first cache, the group's matrix is not: they are gone through in their order.
             list.sort_unstable_by_key(|entry| entry.value);
@@ -186,7 +182,7 @@ impl Pattern {
         let destinations =
             stencils.iter().map(|set| (0..set.len()).map(|group| of_group(set, group)).collect()).collect();
         let groups_in = |tail: &usize| {
-            let in_tail = |&dof: &u32| dof >= BORDER || dof as usize >= free - tail;
+            let in_tail = |&dof: &u32| dof as usize >= free - tail;
             let within = |set: &&Stencils| {
                 (0..set.len()).filter(|&group| locals(set, group).iter().all(in_tail)).collect::<Vec<usize>>()
             };
@@ -201,9 +197,9 @@ impl Pattern {
         self.rows.len()
     }
 
-    /// Length of the array of values: sparse part, border (3 × free), corner (3 × 3, lower triangle), and one entry for all pairs that are not stored.
+    /// Length of the array of values: sparse part, border (3 × free), corner (3 × 3, lower triangle).
     pub fn len(&self) -> usize {
-        self.rows.len() + 3 * self.free + CORNER as usize + 1
+        self.rows.len() + 3 * self.free + CORNER
     }
 
     /// Whether there is no unknown.
@@ -311,9 +307,10 @@ pub fn gradient(terms: &[Term], positions: &[f64], dofs: &Dofs, scratch: &mut Sc
         forces.resize(3 * n, 0.0);
         term.effect.add_gradient(local, forces);
         for (a, &vertex) in term.stencils.group(local.group).iter().enumerate() {
-            for component in 0..3 {
-                if let Some(index) = dofs.index(vertex as usize, component) {
-                    out[index] += forces[component * n + a];
+            for (component, &index) in dofs.of[3 * vertex as usize..][..3].iter().enumerate() {
+                // What is fixed lies beyond the end.
+                if let Some(out) = out.get_mut(index as usize) {
+                    *out += forces[component * n + a];
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! What is read off an equilibrium: the contact's area, pressure and penetration, and the tissue's largest strain.
 
+use nalgebra::Matrix3;
+
 use super::{ContactSummary, Strains, Wall};
 use crate::effect::{Effect, Local};
 use crate::mesh::element::{NODES, POINTS};
@@ -44,18 +46,27 @@ impl Wall<'_> {
         let stencils = &self.topology.elements;
         let mut local = [0.0; 3 * NODES];
         let mut found = Strains { max_strain: 0.0, least_volume_ratio: f64::INFINITY };
+        let mut candidates = Vec::with_capacity(stencils.len());
         for element in 0..stencils.len() {
             stencils.gather(element, positions, &mut local);
             let distortion = self.geometry.solid.distortion(element, &local);
             found.least_volume_ratio = found.least_volume_ratio.min(distortion.least_volume_ratio);
-            // Only candidates are worth eigenvalue problems.
-            if distortion.most_strain <= found.max_strain {
-                continue;
+            candidates.push((distortion.most_strain, element));
+        }
+        // Few are worth eigenvalue problems, if those that may be strained most come first.
+        candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (bound, element) in candidates {
+            if bound <= found.max_strain {
+                break;
             }
+            stencils.gather(element, positions, &mut local);
             for point in 0..POINTS {
                 let f = self.geometry.solid.deformation_gradient(element, point, &local);
-                let stretches = (f.transpose() * f).symmetric_eigenvalues().map(|l| (l.max(0.0).sqrt() - 1.0).abs());
-                found.max_strain = found.max_strain.max(stretches.max());
+                if (f - Matrix3::identity()).norm() > found.max_strain {
+                    let stretches =
+                        (f.transpose() * f).symmetric_eigenvalues().map(|l| (l.max(0.0).sqrt() - 1.0).abs());
+                    found.max_strain = found.max_strain.max(stretches.max());
+                }
             }
         }
         found

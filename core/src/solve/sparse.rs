@@ -46,6 +46,8 @@ pub enum LinearSolveError {
 pub const MAX_RELATIVE_RESIDUAL: f64 = 1e-6;
 /// Steps of refinement at most; each brings the residual down by what the one before left.
 const MOST_REFINEMENTS: usize = 2;
+/// Sums that a product with a column is added up in: one alone would wait for itself.
+const SUMS: usize = 4;
 /// Relative residual above which single precision does not suffice: a factor this far off also tells Newton's method little about its steps.
 const SINGLE_SUFFICES: f64 = 1e-4;
 
@@ -321,16 +323,24 @@ impl Factor {
         self.residual.clear();
         self.residual.extend_from_slice(b);
         for column in 0..pattern.free {
-            let range = pattern.column_starts[column] as usize..pattern.column_starts[column + 1] as usize;
-            let mut below = 0.0;
-            for (&row, value) in pattern.rows[range.clone()].iter().zip(&values[range]) {
-                let row = row as usize;
-                self.residual[row] -= value * x[column];
-                if row != column {
-                    below += value * x[row];
+            // The diagonal is the first entry of its column.
+            let [start, end] = [column, column + 1].map(|column| pattern.column_starts[column] as usize);
+            self.residual[column] -= values[start] * x[column];
+            let (rows, last_rows) = pattern.rows[start + 1..end].as_chunks::<SUMS>();
+            let (entries, last_entries) = values[start + 1..end].as_chunks::<SUMS>();
+            let mut beside = [0.0; SUMS];
+            for (rows, entries) in rows.iter().zip(entries) {
+                for sum in 0..SUMS {
+                    let row = rows[sum] as usize;
+                    self.residual[row] -= entries[sum] * x[column];
+                    beside[sum] += entries[sum] * x[row];
                 }
             }
-            self.residual[column] -= below;
+            for (sum, (&row, entry)) in last_rows.iter().zip(last_entries).enumerate() {
+                self.residual[row as usize] -= entry * x[column];
+                beside[sum] += entry * x[row as usize];
+            }
+            self.residual[column] -= beside.iter().sum::<f64>();
         }
         norm(&self.residual)
     }
