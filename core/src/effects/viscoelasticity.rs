@@ -17,7 +17,7 @@
 use nalgebra::Matrix3;
 
 use super::solid::points::{IDENTITIES, matrix_at, put_matrix};
-use super::solid::products::{Products, add_products};
+use super::solid::products::{Block, Products, add_products};
 use super::solid::{
     Energy, Gradient, Hessian, MaxStep, SolidEnergy, SolidGeometry, StiffnessCoefficients, determinant_and_cofactor,
     push_forward,
@@ -264,7 +264,8 @@ impl SolidEnergy for Viscoelasticity<'_> {
         let mut isotropic = [[0.0; NODES]; NODES];
         let right = self.geometry.gradient_rows(local.group);
         let base = self.geometry.base(local.group);
-        add_products(base, [Products { scales: &scales, left: &pulled_rows, right }], &mut isotropic);
+        let mut block = Block { rows: &mut isotropic, first: 0, step: 1 };
+        add_products(base, [Products { scales: &scales, left: &pulled_rows, right }], &mut block);
         add_isotropic(&isotropic, out);
     }
 }

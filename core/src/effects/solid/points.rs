@@ -58,11 +58,10 @@ pub(in crate::effects) fn put_matrix(matrices: &mut PointMatrices, point: usize,
     }
 }
 
-/// Σ xₐ ⊗ Gₐ over the nodes at every point, for `current` positions x (component-major).
+/// Σ xₐ ⊗ Gₐ over the nodes at every point, for `current` positions x (component-major); what `out` holds beyond the last point stays.
 #[inline(always)]
 pub(super) fn gradients_of(current: &[f64], gradients: &NodeGradients, out: &mut PointMatrices) {
     let position = current.as_chunks::<NODES>().0;
-    *out = IDENTITIES;
     for k in 0..3 {
         let mut sums = [[0.0; PLACES]; 3];
         for a in 0..NODES {

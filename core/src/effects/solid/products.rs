@@ -6,8 +6,19 @@
 use super::{Base, LANES};
 use crate::mesh::element::{FACE_NODES, NODES, POINTS};
 
-/// One number for each pair of nodes of an element.
-pub(in crate::effects) type NodePairs = [[f64; NODES]; NODES];
+/// One number for each pair of nodes of an element, a row for each node: every `step`-th row of a matrix, from `first` on.
+pub(in crate::effects) struct Block<'a> {
+    pub rows: &'a mut [[f64; NODES]],
+    pub first: usize,
+    pub step: usize,
+}
+
+impl Block<'_> {
+    #[inline(always)]
+    pub fn row(&mut self, node: usize) -> &mut [f64; NODES] {
+        &mut self.rows[self.first + node * self.step]
+    }
+}
 
 /// Products in one sum at most: a row for each component at each quadrature point.
 const MOST: usize = 3 * POINTS;
@@ -22,7 +33,7 @@ pub(in crate::effects) struct Products<'a> {
 
 /// Adds `sums`, [`MOST`] products in all at most, to `block`, whose rows are the nodes on the left; what belongs to the element's base is left out where it does not move.
 #[inline(always)]
-pub(in crate::effects) fn add_products<const SUMS: usize>(base: Base, sums: [Products; SUMS], block: &mut NodePairs) {
+pub(in crate::effects) fn add_products<const SUMS: usize>(base: Base, sums: [Products; SUMS], block: &mut Block) {
     let mut scaled = [[0.0; LANES]; MOST];
     match base {
         Base::Free => {
@@ -46,7 +57,7 @@ pub(in crate::effects) fn add_products<const SUMS: usize>(base: Base, sums: [Pro
 pub(in crate::effects) fn add_symmetric_products<const SUMS: usize>(
     base: Base,
     sums: [Products; SUMS],
-    block: &mut NodePairs,
+    block: &mut Block,
 ) {
     let mut scaled = [[0.0; LANES]; MOST];
     if base == Base::Fixed {
@@ -91,11 +102,11 @@ fn add_tile<const VECTORS: usize, const SUMS: usize>(
     [row, vector]: [usize; 2],
     scaled: &[[f64; LANES]; MOST],
     sums: &[Products; SUMS],
-    block: &mut NodePairs,
+    block: &mut Block,
 ) {
     let mut tile = [[[0.0; LANES]; VECTORS]; LANES];
     for r in 0..LANES {
-        tile[r].copy_from_slice(&block[row + r].as_chunks::<LANES>().0[vector..][..VECTORS]);
+        tile[r].copy_from_slice(&block.row(row + r).as_chunks::<LANES>().0[vector..][..VECTORS]);
     }
     let mut scaled = scaled.iter();
     for sum in sums {
@@ -111,6 +122,6 @@ fn add_tile<const VECTORS: usize, const SUMS: usize>(
         }
     }
     for r in 0..LANES {
-        block[row + r].as_chunks_mut::<LANES>().0[vector..][..VECTORS].copy_from_slice(&tile[r]);
+        block.row(row + r).as_chunks_mut::<LANES>().0[vector..][..VECTORS].copy_from_slice(&tile[r]);
     }
 }

@@ -5,7 +5,7 @@
 use nalgebra::Matrix4;
 
 use super::points::MODE_VALUES;
-use super::products::{Products, add_products, add_symmetric_products};
+use super::products::{Block, Products, add_products, add_symmetric_products};
 use super::{LANES, SolidGeometry};
 use crate::effect::LOWER_BLOCKS;
 use crate::mesh::element::{MODES, NODES, POINTS};
@@ -61,7 +61,7 @@ impl SolidGeometry {
                 *scale = rest[row / 3];
             }
             let sum = Products { scales: &scales, left: gradients, right: gradients };
-            add_symmetric_products(base, [sum], &mut isotropic);
+            add_symmetric_products(base, [sum], &mut Block { rows: &mut isotropic, first: 0, step: 1 });
         }
         let mut both = [0.0; POINTS];
         for q in 0..POINTS {
@@ -77,9 +77,16 @@ impl SolidGeometry {
         for &(i, j) in &LOWER_BLOCKS {
             let of_modes =
                 Products { scales: &[1.0; MODES][..modes], left: &weighted[i][..modes], right: &integrals[j][..modes] };
-            let mut block = [[0.0; NODES]; NODES];
+            let mut block = Block { rows, first: i * NODES * 3 + j, step: 3 };
             if i == j {
-                block = isotropic;
+                for (a, isotropic) in isotropic.iter().enumerate().skip(base.nodes()) {
+                    let row = block.row(a).as_chunks_mut::<LANES>().0;
+                    for (row, isotropic) in row.iter_mut().zip(isotropic.as_chunks::<LANES>().0) {
+                        for lane in 0..LANES {
+                            row[lane] += isotropic[lane];
+                        }
+                    }
+                }
                 let of_points = Products { scales: &both, left: &spatial[i], right: &spatial[i] };
                 add_symmetric_products(base, [of_points, of_modes], &mut block);
             } else {
@@ -87,14 +94,6 @@ impl SolidGeometry {
                 let of_outer =
                     Products { scales: &outer[..outers], left: &spatial[i][..outers], right: &spatial[j][..outers] };
                 add_products(base, [of_cross, of_outer, of_modes], &mut block);
-            }
-            for (a, block) in block.iter().enumerate().skip(base.nodes()) {
-                let row = rows[(i * NODES + a) * 3 + j].as_chunks_mut::<LANES>().0;
-                for (row, block) in row.iter_mut().zip(block.as_chunks::<LANES>().0) {
-                    for lane in 0..LANES {
-                        row[lane] += block[lane];
-                    }
-                }
             }
         }
     }
