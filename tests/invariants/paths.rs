@@ -316,10 +316,8 @@ fn auto_decides_by_what_all_steps_ask() {
 #[test]
 fn a_step_without_an_equilibrium_is_named_with_its_cause_and_a_hard_one_is_computed_in_parts() {
     let scene = rough(2.0);
-    let run = |shape: NeedleShape, depth_mm: f64| {
+    let run = |shape: NeedleShape, steps: Vec<Step>| {
         let needle = Needle::pointing(shape, Point3::new(0.0, 0.0, 0.1), &-Vector3::z_axis());
-        let mut steps = path(&[0.0, 0.0, 0.3, -0.3, 0.3], depth_mm);
-        steps[0] = held(0.1, 0.0, -0.05);
         let sequence = Sequence { needle, steps, level: Level::Coarse, effects: named(&["friction"]) };
         let mut simulation = Simulation::new(&scene, &sequence, &mut Silent).unwrap();
         let mut warnings = Vec::new();
@@ -331,8 +329,10 @@ fn a_step_without_an_equilibrium_is_named_with_its_cause_and_a_hard_one_is_compu
             }
         }
     };
-    // The edge of a flat tip that is held by twice the force that presses it folds the tissue under it.
-    let error = run(NeedleShape::flat(0.257), 0.08)
+    // A ball that is pushed mostly along the tissue.
+    let (sin, cos) = 70_f64.to_radians().sin_cos();
+    let along = Step { time_s: 0.2, force_mn: Some(Vector3::new(sin, 0.0, -cos) * 0.3), ..Step::default() };
+    let error = run(NeedleShape::hemispherical(0.257), vec![held(0.1, 0.0, -0.05), along])
         .expect_err("no equilibrium was found when this was written; take a harder one if it is now");
     println!("{error}");
     let SequenceError::At { step, cause, .. } = &error else { panic!("{error}") };
@@ -343,7 +343,9 @@ fn a_step_without_an_equilibrium_is_named_with_its_cause_and_a_hard_one_is_compu
     assert!(error.to_string().contains("steps[1]") && error.to_string().contains("`friction`"), "{error}");
     // Which depth is too hard for one step depends on the way to the equilibrium; one of these is.
     let parted = [0.08, 0.09, 0.1, 0.11, 0.12].into_iter().filter_map(|depth_mm| {
-        let warnings = run(NeedleShape::bevelled(0.257), depth_mm).ok()?;
+        let mut steps = path(&[0.0, 0.0, 0.3, -0.3, 0.3], depth_mm);
+        steps[0] = held(0.1, 0.0, -0.05);
+        let warnings = run(NeedleShape::bevelled(0.257), steps).ok()?;
         warnings.iter().any(|warning| warning.contains("parts of its time")).then_some(depth_mm)
     });
     println!("computed in parts: {:?} mm", parted.clone().collect::<Vec<_>>());
