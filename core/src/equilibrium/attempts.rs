@@ -92,31 +92,34 @@ const ATTEMPTS: [Attempt; 5] = [
         travel_share: 1.0,
     },
 ];
-/// Longest travel of a step between rounds, in that of a direct attempt: under high friction there are several balances for the same pressures, and the needle
-/// must not leap from one to another. Found by trial on the steepest hard case (µ 2 at 74°), which is sensitive to it: it settles at 0.1, 0.12 and 0.3 and not at 0.2 or 0.5;
-/// gentler ones settle at all of them.
-const ROUND_TRAVEL: f64 = 0.12;
+/// Longest travels of a step between rounds, in that of a direct attempt, in the order in which they are tried. Under high friction there are several balances for the same pressures: whole steps find
+/// one soonest, short ones do not leap from one to another where whole ones go to and fro.
+pub(super) const ROUND_TRAVELS: [f64; 2] = [1.0, 0.12];
+
 /// What is tried from an equilibrium nearby: with full steps from where it was left, and where they fail with a line search.
-pub(super) const REPETITIONS: [Attempt; 2] = [
-    Attempt {
-        load_steps: 1,
-        globalization: Globalization::PredictedStress,
-        precision: Precision::Double,
-        max_iterations: 45,
-        max_weakened: 45,
-        resumes: true,
-        travel_share: ROUND_TRAVEL,
-    },
-    Attempt {
-        load_steps: 1,
-        globalization: Globalization::LineSearch,
-        precision: Precision::Double,
-        max_iterations: 100,
-        max_weakened: 100,
-        resumes: false,
-        travel_share: ROUND_TRAVEL,
-    },
-];
+pub(super) const fn repetitions(travel_share: f64) -> [Attempt; 2] {
+    [
+        Attempt {
+            load_steps: 1,
+            globalization: Globalization::PredictedStress,
+            precision: Precision::Double,
+            max_iterations: 45,
+            max_weakened: 45,
+            resumes: true,
+            travel_share,
+        },
+        Attempt {
+            load_steps: 1,
+            globalization: Globalization::LineSearch,
+            precision: Precision::Double,
+            max_iterations: 100,
+            max_weakened: 100,
+            resumes: false,
+            travel_share,
+        },
+    ]
+}
+
 /// Friction coupled to the pressures, from a state nearby.
 pub(super) const COUPLED: Attempt = Attempt {
     load_steps: 1,

@@ -118,7 +118,7 @@ impl Wall<'_> {
             failed => {
                 cost.iterations += failed.and_then(Result::err).map_or(0, |failure| failure.iterations());
                 let start = if is_warm { near } else { self.solve(load, near.positions, workspace, progress)? };
-                self.settle_pressures(load, coefficient, (grip, is_warm), start, workspace, progress)?
+                self.settle_pressures(load, coefficient, (grip, is_warm), &start, workspace, progress)?
             }
         };
         cost += found.newton;

@@ -7,7 +7,7 @@
 
 use nalgebra::Vector3;
 
-use super::super::attempts::REPETITIONS;
+use super::super::attempts::{ROUND_TRAVELS, repetitions};
 use super::super::error::EquilibriumError;
 use super::super::grip::Grip;
 use super::super::{Equilibrium, Load, Wall};
@@ -38,7 +38,7 @@ const NARROWING: f64 = 0.25;
 const SHARE: f64 = 0.3;
 
 impl Wall<'_> {
-    /// The equilibrium with friction of the coefficient `coefficient`, from the one without it, or (`is_warm`) from the one under the pressures that the last motion left.
+    /// The equilibrium with friction of the coefficient `coefficient`, from `start`: the one without it, or (`is_warm`) the one under the pressures that the last motion left.
     ///
     /// # Errors
     /// [`EquilibriumError`].
@@ -46,12 +46,36 @@ impl Wall<'_> {
         &self,
         load: &Load,
         coefficient: f64,
-        (grip, is_warm): (&Grip, bool),
-        mut found: Equilibrium,
+        remembered: (&Grip, bool),
+        start: &Equilibrium,
         workspace: &mut Workspace,
         progress: &mut dyn Progress,
     ) -> Result<(Equilibrium, Rubbing, Grip), EquilibriumError> {
-        let mut total = found.newton;
+        let mut total = start.newton;
+        let mut settled = Err(NewtonError::Interrupted { iterations: 0 }.into());
+        for travel in ROUND_TRAVELS {
+            settled = self.settle_by(travel, load, coefficient, remembered, (start, &mut total), workspace, progress);
+            match &settled {
+                Err(failure) if !failure.is_interrupted() => {}
+                _ => break,
+            }
+        }
+        settled
+    }
+
+    /// The same in steps of `travel` at most, in that of a direct attempt; their cost is added to the start's.
+    #[allow(clippy::too_many_arguments)]
+    fn settle_by(
+        &self,
+        travel: f64,
+        load: &Load,
+        coefficient: f64,
+        (grip, is_warm): (&Grip, bool),
+        (start, total): (&Equilibrium, &mut NewtonReport),
+        workspace: &mut Workspace,
+        progress: &mut dyn Progress,
+    ) -> Result<(Equilibrium, Rubbing, Grip), EquilibriumError> {
+        let mut found = start.clone();
         let approach = self.approach(load, grip, &self.tip(&found.positions));
         let mut pressed = self.pressed(&found.positions);
         let mut mixing = Mixing::default();
@@ -65,19 +89,19 @@ impl Wall<'_> {
             let friction = Friction { faces: &self.faces, points, full_slip_mm: FULL_SLIP_MM * widening };
             let additions = load.with_faces(&friction);
             let with_friction = Load { additions: &additions, ..*load };
-            total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
+            *total += self.repeat(travel, &with_friction, tolerance, &mut found, workspace, progress)?;
             let mut now = self.pressed(&found.positions);
             change = now.change_from(&pressed);
             if settling && change <= SETTLED && tolerance > self.contact.tolerance {
                 tolerance = self.contact.tolerance;
-                total += self.repeat(&with_friction, tolerance, &mut found, workspace, progress)?;
+                *total += self.repeat(travel, &with_friction, tolerance, &mut found, workspace, progress)?;
                 now = self.pressed(&found.positions);
                 change = now.change_from(&pressed);
             }
             if settling && change <= SETTLED {
                 let rubbing = self.rubbing(&friction, &found.positions);
                 let left = self.grip(&friction, &found.positions);
-                return Ok((Equilibrium { newton: total, ..found }, rubbing, left));
+                return Ok((Equilibrium { newton: *total, ..found }, rubbing, left));
             }
             let error: Vec<f64> = now.forces_mn.iter().zip(&pressed.forces_mn).map(|(new, used)| new - used).collect();
             if settling && tolerance > self.contact.tolerance {
@@ -110,6 +134,7 @@ impl Wall<'_> {
     /// One more solve from an equilibrium nearby, to `tolerance` relative to the force scale: with full steps, and where they fail with a line search.
     fn repeat(
         &self,
+        travel: f64,
         load: &Load,
         tolerance: f64,
         found: &mut Equilibrium,
@@ -119,7 +144,7 @@ impl Wall<'_> {
         let drive = self.drive(load.motion, 1.0);
         let mut spent = 0;
         let mut failure = NewtonError::Interrupted { iterations: 0 };
-        for attempt in &REPETITIONS {
+        for attempt in &repetitions(travel) {
             let mut positions = found.positions.clone();
             let drive = (drive, tolerance);
             match self.newton(&self.contact, drive, load, attempt, &mut positions, &mut spent, workspace, progress) {
