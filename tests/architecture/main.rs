@@ -66,13 +66,10 @@ const ONE_WAY: [(&str, &[&str]); 18] = [
 const LONGEST: usize = 400;
 
 /// Longer files, and why they are one file.
-const LONG_FILES: [(&str, &str); 2] = [
-    ("tests/numerics/effects.rs", "one derivative check with a row for each effect"),
-    (
-        "tests/verification/finite_element/block.rs",
-        "mapped blocks, their loads and their solve, used together by every test",
-    ),
-];
+const LONG_FILES: [(&str, &str); 1] = [(
+    "tests/verification/finite_element/block.rs",
+    "mapped blocks, their loads and their solve, used together by every test",
+)];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()

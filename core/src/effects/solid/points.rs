@@ -23,7 +23,7 @@ pub(in crate::effects) type PointMatrices = [[PointNumbers; 3]; 3];
 /// Gradients of the shape functions, indexed (component, node, point).
 pub(in crate::effects) type NodeGradients = [[PointNumbers; NODES]; 3];
 
-/// The same matrix everywhere.
+/// The identity at each point.
 pub(in crate::effects) const IDENTITIES: PointMatrices = {
     let (one, zero) = ([1.0; PLACES], [0.0; PLACES]);
     [[one, zero, zero], [zero, one, zero], [zero, zero, one]]
