@@ -39,7 +39,7 @@ const CASES: &[Case] = &[
         "µ 2, 68° off the normal: pressure and friction hand the force to and fro",
         || rough(2.0),
         || lean(ball(), 30.0, 68.0, 0.1),
-        Answer(40),
+        Answer(15),
     ),
     case(
         "µ 2, 74° off the normal: some of what is so steep settles and some does not",
