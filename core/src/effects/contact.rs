@@ -181,8 +181,9 @@ impl Contact<'_> {
     fn touching<'b>(&'b self, local: &Local) -> impl Iterator<Item = (usize, f64, Point3<f64>)> + 'b {
         let gaps = self.gaps(local);
         let points = self.faces.areas(local.group).iter().enumerate();
-        points.filter_map(move |(point, &area)| {
-            (gaps.mm(point) < self.smoothing_mm).then(|| (point, area, gaps.at(point)))
+        points.filter_map(move |(point, &area)| match gaps.mm(point) < self.smoothing_mm {
+            true => Some((point, area, gaps.at(point))),
+            false => None,
         })
     }
 }
