@@ -203,7 +203,7 @@ impl<'a> Wall<'a> {
             }
             let mut pose = self.tool.patch_from_needle;
             pose.translation.vector += direction.into_inner() * travel_mm;
-            let gradient = self.tool.body.signed_distance(&pose.inverse_transform_point(&nearest.1)).gradient;
+            let (_, gradient) = self.tool.body.distance_and_gradient(&pose.inverse_transform_point(&nearest.1));
             let closing = (pose.rotation * gradient).dot(direction);
             if closing < 1e-3 {
                 return None;

@@ -61,12 +61,12 @@ pub fn anchor(shape: &Body, point: &Point3<f64>, direction: &Unit<Vector3<f64>>)
     let before = shape.distance(&at).abs() + 2.0 * shape.radius_mm();
     at += direction.into_inner() * before;
     for _ in 0..ANCHOR_ITERATIONS {
-        let distance = shape.signed_distance(&at);
-        let closing = distance.gradient.dot(direction);
+        let (distance_mm, gradient) = shape.distance_and_gradient(&at);
+        let closing = gradient.dot(direction);
         if closing < LEAST_CLOSING {
             return nearest(shape, at);
         }
-        let step = distance.value / closing;
+        let step = distance_mm / closing;
         at -= direction.into_inner() * step;
         if step.abs() < ANCHOR_TOLERANCE * shape.radius_mm() {
             break;
@@ -78,9 +78,9 @@ pub fn anchor(shape: &Body, point: &Point3<f64>, direction: &Unit<Vector3<f64>>)
 /// The point of the needle's surface that one comes to by going straight down the distance.
 fn nearest(shape: &Body, mut at: Point3<f64>) -> Point3<f64> {
     for _ in 0..ANCHOR_ITERATIONS {
-        let distance = shape.signed_distance(&at);
-        at -= distance.gradient * (distance.value / distance.gradient.norm_squared());
-        if distance.value.abs() < ANCHOR_TOLERANCE * shape.radius_mm() {
+        let (distance_mm, gradient) = shape.distance_and_gradient(&at);
+        at -= gradient * (distance_mm / gradient.norm_squared());
+        if distance_mm.abs() < ANCHOR_TOLERANCE * shape.radius_mm() {
             break;
         }
     }

@@ -63,7 +63,8 @@ impl Wall<'_> {
             stencils.gather(group, positions, &mut local);
             let local = Local { current: &local, group, predicted: &[] };
             for point in contact.contact_points(&local).filter(|point| point.pressure_kpa > 0.0) {
-                let gradient = self.tool.body.signed_distance(&pose.inverse_transform_point(&point.position)).gradient;
+                let (_, gradient) =
+                    self.tool.body.distance_and_gradient(&pose.inverse_transform_point(&point.position));
                 force_mn += point.pressure_kpa * point.area_mm2 * (pose.rotation * gradient).dot(direction).max(0.0);
             }
         }

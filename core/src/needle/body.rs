@@ -116,9 +116,8 @@ impl Body {
 
     /// Signed distance to the needle's surface at a needle-local point, mm, negative inside.
     pub fn distance(&self, local: &Point3<f64>) -> f64 {
-        let Coordinates { outside_cylinder: a, beyond_plane: b, .. } = self.coordinates(local);
-        let reach = if a > 0.0 && b > 0.0 { (a * a + b * b).sqrt() } else { a.max(b) };
-        reach - self.edge_radius
+        let [distance] = self.distances(&[[local.x], [local.y], [local.z]]);
+        distance
     }
 
     /// [`distance`](Self::distance) of several points, given component by component: one formula for all of them, so that loops over it become vector instructions.
@@ -138,17 +137,22 @@ impl Body {
 
     /// [`distance`](Self::distance), mm, and its gradient: [`signed_distance`](Self::signed_distance) without the second derivative.
     pub(crate) fn distance_and_gradient(&self, local: &Point3<f64>) -> (f64, Vector3<f64>) {
-        let Coordinates { outside_cylinder: a, beyond_plane: b, radial, .. } = self.coordinates(local);
-        let (a_gradient, b_gradient) = self.coordinate_gradients(radial);
-        let (reach, gradient) = if a > 0.0 && b > 0.0 {
+        let (reach, gradient) = self.reach_and_gradient(&self.coordinates(local));
+        (reach - self.edge_radius, gradient)
+    }
+
+    /// Distance to the core (mm), and its gradient.
+    fn reach_and_gradient(&self, at: &Coordinates) -> (f64, Vector3<f64>) {
+        let (a, b) = (at.outside_cylinder, at.beyond_plane);
+        let (a_gradient, b_gradient) = self.coordinate_gradients(at.radial);
+        if a > 0.0 && b > 0.0 {
             let reach = (a * a + b * b).sqrt().max(self.smoothing);
             (reach, (a_gradient * a + b_gradient * b) / reach)
         } else if a > b {
             (a, a_gradient)
         } else {
             (b, b_gradient)
-        };
-        (reach - self.edge_radius, gradient)
+        }
     }
 
     /// Gradients of the two coordinates that the distance is made of.
@@ -190,16 +194,15 @@ impl Body {
             0.0,
             0.0,
         ) / at.axis_distance;
-        let (reach, gradient, hessian) = if a > 0.0 && b > 0.0 {
-            let reach = (a * a + b * b).sqrt().max(self.smoothing);
-            let gradient = (a_gradient * a + b_gradient * b) / reach;
+        let (reach, gradient) = self.reach_and_gradient(&at);
+        let hessian = if a > 0.0 && b > 0.0 {
             let curvature = a_gradient * a_gradient.transpose() + b_gradient * b_gradient.transpose() + a_hessian * a
                 - gradient * gradient.transpose();
-            (reach, gradient, curvature / reach)
+            curvature / reach
         } else if a > b {
-            (a, a_gradient, a_hessian)
+            a_hessian
         } else {
-            (b, b_gradient, Matrix3::zeros())
+            Matrix3::zeros()
         };
         SignedDistance { value: reach - self.edge_radius, gradient, hessian }
     }

@@ -114,7 +114,7 @@ impl Input {
     /// Signed distance (mm) of a point to the needle at `pose`, and its gradient there.
     pub fn distance(&self, pose: &Isometry3<f64>, point: &Vector3<f32>) -> (f32, Vector3<f32>) {
         let local = pose.inverse_transform_point(&Point3::from(point.cast::<f64>()));
-        let distance = self.body.signed_distance(&local);
-        (distance.value as f32, (pose.rotation * distance.gradient).cast::<f32>())
+        let (distance_mm, gradient) = self.body.distance_and_gradient(&local);
+        (distance_mm as f32, (pose.rotation * gradient).cast::<f32>())
     }
 }

@@ -19,12 +19,13 @@ pub fn out_of_needle(input: &Input, answer: &mut Answer) {
         let mut at: Vector3<f64> = (rest + *moved).cast();
         let mut inside = false;
         for _ in 0..STEPS {
-            let distance = input.body.signed_distance(&pose.inverse_transform_point(&Point3::from(at)));
-            let squared = distance.gradient.norm_squared();
-            if distance.value >= -LEFT_MM || squared == 0.0 {
+            let local = pose.inverse_transform_point(&Point3::from(at));
+            let (distance_mm, gradient) = input.body.distance_and_gradient(&local);
+            let squared = gradient.norm_squared();
+            if distance_mm >= -LEFT_MM || squared == 0.0 {
                 break;
             }
-            at -= pose.rotation * distance.gradient * (distance.value / squared);
+            at -= pose.rotation * gradient * (distance_mm / squared);
             inside = true;
         }
         if inside {
