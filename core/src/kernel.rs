@@ -1,6 +1,6 @@
 //! Loops that run under the machine's widest vector instructions: the one place that asks which these are.
 //!
-//! Not here: what is computed. Products that name vectors themselves are in `network::packed`.
+//! Not here: what is computed. Products that name vectors themselves are in `network::packed` and `solve::columns`.
 
 /// A computation in loops that the compiler makes vector instructions of. A trait and not a closure: a closure that is not inlined loses them.
 pub trait Kernel {

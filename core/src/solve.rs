@@ -2,10 +2,12 @@
 //! method on top of them.
 
 mod border;
+mod columns;
 mod condensed;
 mod dense;
 pub mod globalization;
 mod held;
 pub mod newton;
+mod number;
 pub mod sparse;
 mod step;

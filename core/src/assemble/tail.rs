@@ -87,16 +87,15 @@ impl Tail<'_> {
         out
     }
 
-    /// Adds `factor` times their Hessian (mN/mm) to the lower triangle of `out`, column by column.
+    /// Adds `factor` times their Hessian (mN/mm) to the lower triangle of `out`, column by column of `stride` entries.
     pub fn add_hessian(
         &self,
         positions: &[f64],
         stresses: Stresses,
         factor: f64,
         scratch: &mut Scratch,
-        out: &mut [f64],
+        (out, stride): (&mut [f64], usize),
     ) {
-        let size = self.size() + 3;
         let mut unknowns = Vec::new();
         self.for_each_active(positions, stresses, scratch, |_, term, local, _, matrix| {
             let n = 3 * term.stencils.group_size;
@@ -109,7 +108,7 @@ impl Tail<'_> {
                 for (value, &column) in matrix[at * n..=at * n + at].iter().zip(&unknowns) {
                     let (low, high) = (row.min(column), row.max(column));
                     if high != usize::MAX {
-                        out[low * size + high] += factor * value;
+                        out[low * stride + high] += factor * value;
                     }
                 }
             }

@@ -1,17 +1,19 @@
 //! Small dense symmetric systems (the one place that names faer's dense code; the sparse one is `sparse`). Sequential.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::{factor, solve};
+use faer::linalg::cholesky::llt::solve;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::{Accum, MatMut, MatRef, Par, Spec};
+use faer::{Accum, MatMut, MatRef, Par};
+use pulp::{Arch, Simd, WithSimd};
 
+use super::columns::{factorize, padded};
 use crate::kernel::{Kernel, run_kernel};
 
-/// The lower triangle of a symmetric matrix, column by column, with a border of a few rows more that is carried along and not solved for.
+/// The lower triangle of a symmetric matrix, column by column, with a border of a few rows and columns more that is carried along.
 #[derive(Debug)]
 pub(super) struct Dense {
     size: usize,
-    /// Rows, those of the border included.
+    /// Length of a column: its rows, those of the border, then zeros.
     stride: usize,
     values: Vec<f64>,
 }
@@ -30,7 +32,7 @@ impl Clone for Dense {
 impl Dense {
     /// Zeros.
     pub fn zeros(size: usize, border: usize) -> Self {
-        let stride = size + border;
+        let stride = padded(size + border);
         Dense { size, stride, values: vec![0.0; stride * stride] }
     }
 
@@ -54,9 +56,9 @@ impl Dense {
         self.values[column * self.stride + row] = value;
     }
 
-    /// Every entry, column by column, the border's rows and columns after the others; those above the diagonal are not read.
-    pub fn lower_mut(&mut self) -> &mut [f64] {
-        &mut self.values
+    /// Every entry, column by column, the border's rows and columns after the others, and the length of a column; those above the diagonal are not read.
+    pub fn lower_mut(&mut self) -> (&mut [f64], usize) {
+        (&mut self.values, self.stride)
     }
 
     /// Leaves the border zero.
@@ -99,12 +101,9 @@ impl Dense {
         out
     }
 
-    /// Replaces the matrix by its Cholesky factor, the border kept; whether it is positive definite.
+    /// Replaces the matrix by its Cholesky factor; whether it is positive definite. The border's rows are solved along.
     pub fn factorize(&mut self) -> bool {
-        let mut memory = MemBuffer::new(factor::cholesky_in_place_scratch::<f64>(self.size, Par::Seq, Spec::default()));
-        let stack = MemStack::new(&mut memory);
-        let regularization = factor::LltRegularization::default();
-        factor::cholesky_in_place(self.inner_mut(), regularization, Par::Seq, stack, Spec::default()).is_ok()
+        Arch::new().dispatch(Factorization(self))
     }
 
     /// Solves in place with the factor that this is, for right-hand sides of `size` entries each, one after the other.
@@ -113,6 +112,18 @@ impl Dense {
         let mut memory = MemBuffer::new(solve::solve_in_place_scratch::<f64>(self.size, count, Par::Seq));
         let columns = MatMut::from_column_major_slice_mut(columns, self.size, count);
         solve::solve_in_place(self.inner(), columns, Par::Seq, MemStack::new(&mut memory));
+    }
+}
+
+struct Factorization<'a>(&'a mut Dense);
+
+impl WithSimd for Factorization<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> bool {
+        let Dense { size, stride, values } = self.0;
+        factorize(simd, values, *size, *stride)
     }
 }
 

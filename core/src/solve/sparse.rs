@@ -6,8 +6,9 @@
 //! A matrix is factorised in single precision, at half the cost, and its solutions are refined in double: residuals are those of the matrix as it is, and each step of refinement
 //! brings them down by what single precision leaves (J. H. Wilkinson, *Rounding Errors in Algebraic Processes*, 1963; J. Langou et al., SC 2006). Where that is too much, for the
 //! matrix is ill conditioned or close to indefinite, it is factorised once more in double precision.
-//! Read on in `numeric` (what faer is asked for).
+//! Read on in `factorization` (small matrices), `numeric` (one factorisation; what faer is asked for) and `substitution`.
 
+mod factorization;
 mod numeric;
 mod substitution;
 
@@ -22,6 +23,7 @@ use thiserror::Error;
 
 use super::dense::Dense;
 use crate::assemble::Pattern;
+use factorization::Plan;
 use numeric::Numeric;
 use substitution::Supernode;
 
@@ -51,6 +53,9 @@ const SUMS: usize = 4;
 /// Relative residual above which single precision does not suffice: a factor this far off also tells Newton's method little about its steps.
 const SINGLE_SUFFICES: f64 = 1e-4;
 
+/// Columns of the widest supernode of a factor that is small: above, packed products are faster (`columns`).
+const WIDEST_SMALL: usize = 600;
+
 /// The analysed pattern; independent of values, shared between threads.
 #[derive(Debug)]
 pub struct SymbolicFactor {
@@ -58,6 +63,8 @@ pub struct SymbolicFactor {
     /// The lower triangle, checked once for all.
     structure: SymbolicSparseColMat<u32>,
     supernodes: Vec<Supernode>,
+    /// Of factors that are small.
+    plan: Option<Plan>,
     scratch: StackReq,
 }
 
@@ -82,15 +89,17 @@ impl SymbolicFactor {
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
         ]);
         let supernodes = numeric::supernodes(&symbolic);
-        let supernodes = supernodes.ok_or_else(|| LinearSolveError::Analysis("no supernodes".to_string()))?;
+        let mut supernodes = supernodes.ok_or_else(|| LinearSolveError::Analysis("no supernodes".to_string()))?;
+        let widest = supernodes.iter().map(|supernode| supernode.columns).max().unwrap_or(0);
+        let plan = (widest <= WIDEST_SMALL).then(|| Plan::new(pattern, &mut supernodes));
         let (starts, rows) = (pattern.column_starts.clone(), pattern.rows.clone());
         let structure = SymbolicSparseColMat::new_checked(n, n, starts, None, rows);
-        Ok(SymbolicFactor { symbolic, structure, supernodes, scratch })
+        Ok(SymbolicFactor { symbolic, structure, supernodes, plan, scratch })
     }
 
     /// Number of stored entries of the factor.
     pub fn stored(&self) -> usize {
-        self.symbolic.len_val()
+        self.supernodes.last().map_or(0, |last| last.values.end)
     }
 }
 
@@ -133,7 +142,7 @@ pub struct Factor {
     /// Which is tried first.
     first: Precision,
     stack: MemBuffer,
-    /// Entries of the matrix, then right-hand sides, in single precision.
+    /// Right-hand sides in single precision.
     rounded: Vec<f32>,
     residual: Vec<f64>,
 }
@@ -168,10 +177,9 @@ impl Factor {
         values: &[f64],
     ) -> Result<(), LinearSolveError> {
         if self.first == Precision::Single {
-            self.round(&values[..pattern.stored()]);
             let stack = MemStack::new(&mut self.stack);
             self.at_hand = Precision::Single;
-            if self.single.factorize(&symbolic.symbolic, symbolic.structure.as_ref(), &self.rounded, stack) {
+            if self.single.factorize(symbolic, &values[..pattern.stored()], stack) {
                 return Ok(());
             }
             // What seems indefinite in single precision may be definite in double; and what is about to buckle is close to singular from here on.
@@ -188,16 +196,10 @@ impl Factor {
     ) -> Result<(), LinearSolveError> {
         let stack = MemStack::new(&mut self.stack);
         self.at_hand = Precision::Double;
-        match self.double.factorize(&symbolic.symbolic, symbolic.structure.as_ref(), &values[..pattern.stored()], stack)
-        {
+        match self.double.factorize(symbolic, &values[..pattern.stored()], stack) {
             true => Ok(()),
             false => Err(LinearSolveError::Indefinite),
         }
-    }
-
-    fn round(&mut self, values: &[f64]) {
-        self.rounded.clear();
-        self.rounded.extend(values.iter().map(|value| *value as f32));
     }
 
     /// Solves A x = b for right-hand sides laid out one after the other in `rhs`, in place, and checks each residual
@@ -249,7 +251,8 @@ impl Factor {
     ) {
         match self.at_hand {
             Precision::Single => {
-                self.round(columns);
+                self.rounded.clear();
+                self.rounded.extend(columns.iter().map(|value| *value as f32));
                 single(&mut self.single, &mut self.rounded);
                 columns.iter_mut().zip(&self.rounded).for_each(|(x, rounded)| *x = f64::from(*rounded));
             }

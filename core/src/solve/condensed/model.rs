@@ -126,20 +126,22 @@ impl Model<'_> {
     fn step(&self, at: &State, max_travel_mm: f64, hessian: &mut Dense, workspace: &mut Workspace) -> Option<Vec<f64>> {
         let size = self.force.len();
         let positions = self.positions(&at.unknowns);
+        let directions: Vec<Vector3<f64>> =
+            self.drive.directions().into_iter().map(|(direction, _)| direction).collect();
+        let mut couplings = Vec::new();
         // Stresses far above those in balance turn the Hessian over; without them it is as definite as the tissue.
         [Stresses::Current, Stresses::None].into_iter().find(|stresses| {
             hessian.clone_from(self.tissue);
             self.tail.add_hessian(&positions, *stresses, 1.0, &mut workspace.scratch, hessian.lower_mut());
+            couplings.clear();
+            for direction in &directions {
+                let coupled = |i: usize| (0..3).map(|k| hessian.at(size + k, i) * direction[k]).sum::<f64>();
+                couplings.extend((0..size).map(coupled));
+            }
             hessian.factorize()
         })?;
-        let directions: Vec<Vector3<f64>> =
-            self.drive.directions().into_iter().map(|(direction, _)| direction).collect();
         let mut columns: Vec<f64> = at.residual.iter().map(|r| -r).collect();
-        for direction in &directions {
-            let coupled = |i: usize| (0..3).map(|k| hessian.at(size + k, i) * direction[k]).sum::<f64>();
-            columns.extend((0..size).map(coupled));
-        }
-        let couplings = columns[size..].to_vec();
+        columns.extend_from_slice(&couplings);
         hessian.substitute(&mut columns);
         let bordered = Bordered {
             directions: &directions,

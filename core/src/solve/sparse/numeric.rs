@@ -1,44 +1,51 @@
-//! The numbers of one factorisation in one precision: what faer is asked for, alike for `f32` and `f64`.
+//! The numbers of one factorisation in one precision, alike for `f32` and `f64`: small ones by `factorization`, large ones by faer.
 //!
 //! Not here: which precision is enough (`sparse`).
 
 use faer::dyn_stack::MemStack;
 use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::traits::RealField;
 use faer::{Par, Side, Spec};
+use pulp::Arch;
 
-use super::substitution::{Number, Substitution, Supernode};
+use super::SymbolicFactor;
+use super::factorization::Factorization;
+use super::substitution::{Substitution, Supernode};
 use crate::kernel::run_kernel;
 use crate::solve::dense::Dense;
+use crate::solve::number::Number;
 
 /// The values of the factor L.
 pub(super) struct Numeric<T> {
     values: Vec<T>,
-    /// Of a substitution.
+    /// Of a substitution or of products.
     memory: Vec<T>,
+    /// Entries of a matrix.
+    rounded: Vec<T>,
 }
 
 impl<T: RealField + Number + Into<f64>> Numeric<T> {
     /// No factor yet.
     pub fn empty() -> Self {
-        Numeric { values: Vec::new(), memory: Vec::new() }
+        Numeric { values: Vec::new(), memory: Vec::new(), rounded: Vec::new() }
     }
 
-    /// Factorises the matrix with the entries `matrix` in the lower triangle `structure`; whether it is positive definite.
-    pub fn factorize(
-        &mut self,
-        symbolic: &SymbolicCholesky<u32>,
-        structure: SymbolicSparseColMatRef<u32>,
-        matrix: &[T],
-        stack: &mut MemStack,
-    ) -> bool {
-        self.values.resize(symbolic.len_val(), T::zero_impl());
+    /// Factorises the matrix with the entries `matrix` in the lower triangle; whether it is positive definite.
+    pub fn factorize(&mut self, symbolic: &SymbolicFactor, matrix: &[f64], stack: &mut MemStack) -> bool {
+        let SymbolicFactor { symbolic, structure, supernodes, plan, .. } = symbolic;
+        let Numeric { values, memory, rounded } = self;
+        values.resize(supernodes.last().map_or(0, |last| last.values.end), T::default());
+        if let Some(plan) = plan {
+            return Arch::new().dispatch(Factorization { plan, supernodes, matrix, values, memory });
+        }
+        rounded.clear();
+        rounded.extend(matrix.iter().map(|entry| T::nearest(*entry)));
         symbolic
             .factorize_numeric_llt(
-                &mut self.values,
-                SparseColMatRef::new(structure, matrix),
+                values,
+                SparseColMatRef::new(structure.as_ref(), rounded),
                 Side::Lower,
                 LltRegularization::default(),
                 Par::Seq,
@@ -66,15 +73,15 @@ impl<T: RealField + Number + Into<f64>> Numeric<T> {
     pub fn tail(&self, supernodes: &[Supernode], size: usize, border: usize) -> Dense {
         let mut tail = Dense::zeros(size, border);
         let first = supernodes.last().map_or(0, |last| last.start + last.columns) - size;
-        for Supernode { start, columns, below, values } in supernodes.iter().rev() {
+        for supernode in supernodes.iter().rev() {
+            let Supernode { start, columns, below, values, stride } = supernode;
             if start + columns <= first {
                 break;
             }
-            let rows = columns + below.len();
             let block = &self.values[values.clone()];
             for column in first.saturating_sub(*start)..*columns {
                 let to = start + column - first;
-                let entries = &block[column * rows..][..rows];
+                let entries = &block[column * stride..][..*stride];
                 for row in column..*columns {
                     tail.set(start + row - first, to, entries[row].into());
                 }
@@ -87,15 +94,16 @@ impl<T: RealField + Number + Into<f64>> Numeric<T> {
     }
 }
 
-/// The supernodes of a factor; `None` if it has none.
+/// The supernodes of a factor as faer lays them out; `None` if it has none.
 pub(super) fn supernodes(symbolic: &SymbolicCholesky<u32>) -> Option<Vec<Supernode>> {
     let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { return None };
     let (begins, ends, values) = (raw.supernode_begin(), raw.supernode_end(), raw.col_ptr_for_val());
-    let supernode = |index: usize| Supernode {
-        start: begins[index] as usize,
-        columns: (ends[index] - begins[index]) as usize,
-        below: raw.supernode(index).pattern().to_vec(),
-        values: values[index] as usize..values[index + 1] as usize,
+    let supernode = |index: usize| {
+        let columns = (ends[index] - begins[index]) as usize;
+        let below = raw.supernode(index).pattern().to_vec();
+        let stride = columns + below.len();
+        let values = values[index] as usize..values[index + 1] as usize;
+        Supernode { start: begins[index] as usize, columns, below, values, stride }
     };
     Some((0..raw.n_supernodes()).map(supernode).collect())
 }

@@ -3,9 +3,10 @@
 //! One right-hand side leaves nothing to block: what a product of matrices gains has to be set up for every supernode, and these have but a few dozen columns.
 //! Not here: the factorisation (`numeric`).
 
-use std::ops::{Add, AddAssign, Div, Mul, Range, Sub, SubAssign};
+use std::ops::Range;
 
 use crate::kernel::Kernel;
+use crate::solve::number::Number;
 
 /// Neighbouring columns of the factor with the same rows below them.
 #[derive(Clone, Debug)]
@@ -18,23 +19,19 @@ pub(super) struct Supernode {
     pub below: Vec<u32>,
     /// Its entries among those of the factor: a dense block of `columns` + `below` rows, column by column.
     pub values: Range<usize>,
+    /// Length of a column of the block: as many rows, then zeros.
+    pub stride: usize,
 }
 
-/// What a factor's entries can be: `f32` or `f64`.
-pub(super) trait Number:
-    Copy
-    + Default
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + AddAssign
-    + SubAssign
-{
+impl Supernode {
+    /// Place of a row of the matrix in its columns.
+    pub fn place(&self, row: u32) -> usize {
+        match (row as usize).checked_sub(self.start) {
+            Some(own) if own < self.columns => own,
+            _ => self.columns + self.below.partition_point(|&below| below < row),
+        }
+    }
 }
-
-impl Number for f32 {}
-impl Number for f64 {}
 
 /// Columns that are gone through at once.
 const SIDE_BY_SIDE: usize = 4;
@@ -74,16 +71,15 @@ impl<T: Number> Kernel for Substitution<'_, T> {
 
 #[inline(always)]
 fn forward<T: Number>(supernode: &Supernode, block: &[T], x: &mut [T], memory: &mut Vec<T>) {
-    let Supernode { start, columns, below, .. } = supernode;
-    let rows = columns + below.len();
-    let own = &mut x[*start..][..*columns];
+    let &Supernode { start, columns, ref below, stride, .. } = supernode;
+    let own = &mut x[start..][..columns];
     memory.clear();
     memory.extend_from_slice(own);
-    memory.resize(rows, T::default());
-    let (fours, rest) = block.split_at(columns / SIDE_BY_SIDE * SIDE_BY_SIDE * rows);
+    memory.resize(stride, T::default());
+    let (fours, rest) = block.split_at(columns / SIDE_BY_SIDE * SIDE_BY_SIDE * stride);
     let mut first = 0;
-    for four in fours.chunks_exact(SIDE_BY_SIDE * rows) {
-        let column = from_row(first, four, rows);
+    for four in fours.chunks_exact(SIDE_BY_SIDE * stride) {
+        let column = from_row(first, four, stride);
         let (solved, left) = memory[first..].split_at_mut(SIDE_BY_SIDE);
         for c in 0..SIDE_BY_SIDE {
             for earlier in 0..c {
@@ -92,11 +88,11 @@ fn forward<T: Number>(supernode: &Supernode, block: &[T], x: &mut [T], memory: &
             }
             solved[c] = solved[c] / column[c][c];
         }
-        let below = from_row(first + SIDE_BY_SIDE, four, rows);
+        let below = from_row(first + SIDE_BY_SIDE, four, stride);
         subtract(below, [solved[0], solved[1], solved[2], solved[3]], left);
         first += SIDE_BY_SIDE;
     }
-    for column in rest.chunks_exact(rows) {
+    for column in rest.chunks_exact(stride) {
         let [solved, left @ ..] = &mut memory[first..] else { break };
         *solved = *solved / column[first];
         for (left, entry) in left.iter_mut().zip(&column[first + 1..]) {
@@ -104,18 +100,18 @@ fn forward<T: Number>(supernode: &Supernode, block: &[T], x: &mut [T], memory: &
         }
         first += 1;
     }
-    own.copy_from_slice(&memory[..*columns]);
-    for (change, &row) in memory[*columns..].iter().zip(below) {
+    own.copy_from_slice(&memory[..columns]);
+    for (change, &row) in memory[columns..].iter().zip(below) {
         x[row as usize] += *change;
     }
 }
 
-/// Four columns of `rows` entries each, from the row `first` on. Written out: closures that are not inlined leave the vector instructions behind.
+/// Four columns of `stride` entries each, from the row `first` on. Written out: closures that are not inlined leave the vector instructions behind.
 #[inline(always)]
-fn from_row<T>(first: usize, four: &[T], rows: usize) -> [&[T]; SIDE_BY_SIDE] {
-    let (a, others) = four.split_at(rows);
-    let (b, others) = others.split_at(rows);
-    let (c, d) = others.split_at(rows);
+fn from_row<T>(first: usize, four: &[T], stride: usize) -> [&[T]; SIDE_BY_SIDE] {
+    let (a, others) = four.split_at(stride);
+    let (b, others) = others.split_at(stride);
+    let (c, d) = others.split_at(stride);
     [&a[first..], &b[first..], &c[first..], &d[first..]]
 }
 
@@ -174,15 +170,15 @@ fn back<T: Number>(supernode: &Supernode, columns: usize, block: &[T], x: &mut [
     if columns == 0 {
         return;
     }
-    let Supernode { start, columns: own, below, .. } = supernode;
-    let rows = own + below.len();
+    let &Supernode { start, columns: own, ref below, stride, .. } = supernode;
     memory.clear();
-    memory.extend_from_slice(&x[*start..][..*own]);
+    memory.extend_from_slice(&x[start..][..own]);
     memory.extend(below.iter().map(|&row| x[row as usize]));
+    memory.resize(stride, T::default());
     let fours = columns / SIDE_BY_SIDE * SIDE_BY_SIDE;
-    let (fours, rest) = block[..columns * rows].split_at(fours * rows);
+    let (fours, rest) = block[..columns * stride].split_at(fours * stride);
     let mut first = columns;
-    for column in rest.chunks_exact(rows).rev() {
+    for column in rest.chunks_exact(stride).rev() {
         first -= 1;
         let [unknown, known @ ..] = &mut memory[first..] else { break };
         let mut left = *unknown;
@@ -191,11 +187,11 @@ fn back<T: Number>(supernode: &Supernode, columns: usize, block: &[T], x: &mut [
         }
         *unknown = left / column[first];
     }
-    for four in fours.chunks_exact(SIDE_BY_SIDE * rows).rev() {
+    for four in fours.chunks_exact(SIDE_BY_SIDE * stride).rev() {
         first -= SIDE_BY_SIDE;
-        let column = from_row(first, four, rows);
+        let column = from_row(first, four, stride);
         let (unknown, known) = memory[first..].split_at_mut(SIDE_BY_SIDE);
-        let products = products(from_row(first + SIDE_BY_SIDE, four, rows), known);
+        let products = products(from_row(first + SIDE_BY_SIDE, four, stride), known);
         for c in (0..SIDE_BY_SIDE).rev() {
             let mut left = unknown[c] - products[c];
             for later in c + 1..SIDE_BY_SIDE {
@@ -204,5 +200,5 @@ fn back<T: Number>(supernode: &Supernode, columns: usize, block: &[T], x: &mut [
             unknown[c] = left / column[c][c];
         }
     }
-    x[*start..][..columns].copy_from_slice(&memory[..columns]);
+    x[start..][..columns].copy_from_slice(&memory[..columns]);
 }
