@@ -70,12 +70,10 @@ impl SolidEnergy for Elasticity<'_> {
     fn add_hessian_n(&self, local: &Local, out: &mut [f64]) {
         let material = &self.materials[local.group];
         let mut gradients = [[[0.0; NODES]; POINTS]; 3];
+        self.geometry.rest_gradients(local.group, &mut gradients);
         let mut coefficients = StiffnessCoefficients::ZERO;
         let mut volumetric = Volumetric { dilatation: [1.0; POINTS], stiffness: [0.0; POINTS] };
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
-            for (rows, gradient) in gradients.iter_mut().zip(self.geometry.gradients(local.group, q)) {
-                rows[q] = *gradient;
-            }
             coefficients.rest[q] = weight * material.mu;
             coefficients.cross[q] = weight * material.mu;
             volumetric.stiffness[q] = weight * material.lambda;

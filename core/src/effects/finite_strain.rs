@@ -11,10 +11,9 @@
 //! With π the projected pressure U′(θ), the stress is P = P_pointwise + π J F⁻ᵀ and the second derivative follows from
 //! ∂²J/∂xₐᵢ∂x_bⱼ = J (gₐᵢ g_bⱼ − gₐⱼ g_bᵢ).
 
-use super::solid::points::{IDENTITIES, PLACES, PointMatrices, PointNumbers, determinants_and_cofactors, matrix_at};
+use super::solid::points::{IDENTITIES, PLACES, PointMatrices, PointNumbers, determinants_and_cofactors};
 use super::solid::{
     Energy, Gradient, Hessian, MaxStep, PointRows, SolidEnergy, SolidGeometry, StiffnessCoefficients, Volumetric,
-    push_forward,
 };
 use crate::effect::{Effect, Local};
 use crate::kernel::{Kernel, run_kernel};
@@ -140,9 +139,9 @@ impl FiniteStrain<'_> {
     fn add_mixed(&self, local: &Local, points: &Points, spatial: &PointRows, out: &mut [f64]) {
         let mu = self.materials[local.group].mu;
         let rows = out.as_chunks_mut::<NODES>().0;
+        let mut pushed = [[[0.0; NODES]; POINTS]; 3];
+        self.geometry.push_forward(local.group, &points.f, &mut pushed);
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
-            let mut pushed = [[[0.0; NODES]; POINTS]; 3];
-            push_forward(&matrix_at(&points.f, q), self.geometry.gradients(local.group, q), q, &mut pushed);
             let scale = -2.0 / 3.0 * weight * mu * points.j[q].powf(-2.0 / 3.0);
             for i in 0..3 {
                 for a in 0..NODES {
@@ -266,12 +265,11 @@ impl SolidEnergy for FiniteStrain<'_> {
         }
         let material = &self.materials[local.group];
         let mut spatial = [[[0.0; NODES]; POINTS]; 3];
+        self.geometry.push_forward(local.group, &points.f_inverse_transposed, &mut spatial);
         let mut coefficients = StiffnessCoefficients::ZERO;
         let mut volumetric = Volumetric { dilatation: [0.0; POINTS], stiffness: [0.0; POINTS] };
         let squared = points.squared_stretches();
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
-            let rest = self.geometry.gradients(local.group, q);
-            push_forward(&matrix_at(&points.f_inverse_transposed, q), rest, q, &mut spatial);
             let j = points.j[q];
             volumetric.dilatation[q] = j;
             let pj = pressure[q] * j;

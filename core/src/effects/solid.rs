@@ -11,21 +11,20 @@ pub(super) mod points;
 pub(super) mod products;
 mod stiffness;
 
-use std::sync::LazyLock;
-
-use nalgebra::{Matrix3, Matrix4};
+use nalgebra::{Matrix3, Matrix4, RowVector3, Vector3};
 use thiserror::Error;
 
 use crate::effect::{Local, Stencils};
 use crate::kernel::{Kernel, run_kernel};
 use crate::mesh::element::{FACE_NODES, MODES, NODES, POINTS, QUADRATURE};
 use points::{
-    IDENTITIES, MODE_VALUES, NodeGradients, PLACES, PointNumbers, determinants_and_cofactors, gradients_of, matrix_at,
+    IDENTITIES, MODE_VALUES, PLACES, PointMatrices, PointNumbers, determinants_and_cofactors, matrix_at,
+    reference_gradients_of,
 };
 pub use stiffness::{PointRows, StiffnessCoefficients, Volumetric};
 
 /// One number per node for each component: a row of shape function gradients.
-pub type NodeRows = [[f64; NODES]; 3];
+type NodeRows = [[f64; NODES]; 3];
 
 /// Numbers that are computed together: loops over them become vector instructions.
 const LANES: usize = 4;
@@ -73,10 +72,8 @@ impl Base {
 /// Rest geometry of every element of a stencil set.
 #[derive(Clone, Debug)]
 pub struct SolidGeometry {
-    /// ∂N/∂X (1/mm), indexed (element, point).
-    gradients: Vec<NodeRows>,
-    /// The same, for each element the points side by side.
-    by_node: Vec<NodeGradients>,
+    /// J⁻ᵀ with J = ∂X/∂ξ at each element's points (1/mm): what turns gradients on the reference element into those at rest.
+    inverse_transposed: Vec<PointMatrices>,
     /// Quadrature weight × rest Jacobian (mm³) of each element's points.
     weights: Vec<PointNumbers>,
     /// Inverse of the rest-volume mass matrix of the pressure modes (1/mm³), one per element.
@@ -93,8 +90,7 @@ impl SolidGeometry {
     pub fn new(stencils: &Stencils, rest: &[f64]) -> Result<Self, SolidGeometryError> {
         let elements = stencils.len();
         let mut geometry = SolidGeometry {
-            gradients: vec![[[0.0; NODES]; 3]; elements * POINTS],
-            by_node: vec![[[[0.0; PLACES]; NODES]; 3]; elements],
+            inverse_transposed: vec![IDENTITIES; elements],
             weights: vec![[0.0; PLACES]; elements],
             mode_inverse: vec![Matrix4::zeros(); elements],
             bases: Vec::new(),
@@ -117,18 +113,6 @@ impl SolidGeometry {
         self.bases.get(element).copied().unwrap_or(Base::Free)
     }
 
-    /// Rest gradients of the shape functions at one point: three rows (x, y, z) of one number per node (1/mm).
-    #[inline(always)]
-    pub fn gradients(&self, element: usize, point: usize) -> &NodeRows {
-        &self.gradients[element * POINTS + point]
-    }
-
-    /// The same of all points of an element: the x, y, z rows of the first point, then those of the next.
-    #[inline(always)]
-    pub(super) fn gradient_rows(&self, element: usize) -> &[[f64; NODES]] {
-        self.gradients[element * POINTS..(element + 1) * POINTS].as_flattened()
-    }
-
     /// Quadrature weights × rest Jacobian of one element (mm³).
     #[inline(always)]
     pub fn weights(&self, element: usize) -> &[f64] {
@@ -143,8 +127,12 @@ impl SolidGeometry {
 
     /// Deformation gradient F = Σ xₐ ⊗ Gₐ at one point.
     pub fn deformation_gradient(&self, element: usize, point: usize, current: &[f64]) -> Matrix3<f64> {
-        let gradients = self.gradients(element, point);
-        Matrix3::from_fn(|i, k| (0..NODES).map(|a| current[i * NODES + a] * gradients[k][a]).sum())
+        let mut reference = Matrix3::zeros();
+        for (a, shape) in QUADRATURE[point].shapes.iter().enumerate() {
+            let position = Vector3::new(current[a], current[NODES + a], current[2 * NODES + a]);
+            reference += position * RowVector3::from(shape.gradient);
+        }
+        reference * matrix_at(&self.inverse_transposed[element], point).transpose()
     }
 
     /// The largest t such that no point's J falls below a tenth of its value along `current + t step`.
@@ -173,59 +161,29 @@ struct Measure<'a> {
     rest: &'a [f64],
 }
 
-/// Gradients of the shape functions on the reference element.
-static REFERENCE_GRADIENTS: LazyLock<NodeGradients> = LazyLock::new(|| {
-    let mut gradients = [[[0.0; PLACES]; NODES]; 3];
-    for (q, point) in QUADRATURE.iter().enumerate() {
-        for (a, shape) in point.shapes.iter().enumerate() {
-            for k in 0..3 {
-                gradients[k][a][q] = shape.gradient[k];
-            }
-        }
-    }
-    gradients
-});
-
 impl Kernel for Measure<'_> {
     type Output = Result<(), SolidGeometryError>;
 
     #[inline(always)]
     fn run(self) -> Self::Output {
         let Measure { geometry, element, rest } = self;
-        let reference = &*REFERENCE_GRADIENTS;
-        let (mut jacobian, mut inverse_transposed) = (IDENTITIES, IDENTITIES);
-        gradients_of(rest, reference, &mut jacobian);
-        let mut determinant = [0.0; PLACES];
-        determinants_and_cofactors(&jacobian, &mut determinant, &mut inverse_transposed);
+        let (mut jacobian, mut determinant) = (IDENTITIES, [1.0; PLACES]);
+        reference_gradients_of(rest, &mut jacobian);
+        let inverse_transposed = &mut geometry.inverse_transposed[element];
+        determinants_and_cofactors(&jacobian, &mut determinant, inverse_transposed);
         for (point, &jacobian) in determinant[..POINTS].iter().enumerate() {
             if jacobian.is_nan() || jacobian <= 0.0 {
                 return Err(SolidGeometryError::Inverted { element, point, jacobian });
             }
         }
+        for entries in inverse_transposed.as_flattened_mut() {
+            for q in 0..PLACES {
+                entries[q] /= determinant[q];
+            }
+        }
         let weights = &mut geometry.weights[element];
         for (q, point) in QUADRATURE.iter().enumerate() {
             weights[q] = point.weight * determinant[q];
-        }
-        let by_node = &mut geometry.by_node[element];
-        for k in 0..3 {
-            for l in 0..3 {
-                let mut inverse = [0.0; PLACES];
-                for q in 0..PLACES {
-                    inverse[q] = inverse_transposed[k][l][q] / determinant[q];
-                }
-                for a in 0..NODES {
-                    for q in 0..PLACES {
-                        by_node[k][a][q] += reference[l][a][q] * inverse[q];
-                    }
-                }
-            }
-        }
-        for (q, rows) in geometry.gradients[element * POINTS..][..POINTS].iter_mut().enumerate() {
-            for k in 0..3 {
-                for a in 0..NODES {
-                    rows[k][a] = by_node[k][a][q];
-                }
-            }
         }
         let modes = &*MODE_VALUES;
         let mut mass = Matrix4::zeros();
@@ -248,17 +206,6 @@ pub(super) fn determinant_and_cofactor(f: &Matrix3<f64>) -> (f64, Matrix3<f64>) 
     let (c0, c1, c2) = (f.column(0), f.column(1), f.column(2));
     let cofactor = Matrix3::from_columns(&[c1.cross(&c2), c2.cross(&c0), c0.cross(&c1)]);
     (c0.dot(&cofactor.column(0)), cofactor)
-}
-
-/// `out` at `point` = matrix × gradients, node by node.
-#[inline(always)]
-pub(super) fn push_forward(matrix: &Matrix3<f64>, gradients: &NodeRows, point: usize, out: &mut PointRows) {
-    for i in 0..3 {
-        for a in 0..NODES {
-            out[i][point][a] =
-                matrix[(i, 0)] * gradients[0][a] + matrix[(i, 1)] * gradients[1][a] + matrix[(i, 2)] * gradients[2][a];
-        }
-    }
 }
 
 /// What a solid effect computes on one element; implementations are `#[inline(always)]`.

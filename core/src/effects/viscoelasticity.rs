@@ -20,7 +20,6 @@ use super::solid::points::{IDENTITIES, matrix_at, put_matrix};
 use super::solid::products::{Block, Products, add_products};
 use super::solid::{
     Energy, Gradient, Hessian, MaxStep, SolidEnergy, SolidGeometry, StiffnessCoefficients, determinant_and_cofactor,
-    push_forward,
 };
 use crate::effect::{Effect, Local, Stencils, add_isotropic};
 use crate::kernel::run_kernel;
@@ -243,29 +242,25 @@ impl SolidEnergy for Viscoelasticity<'_> {
     #[inline(always)]
     fn add_hessian_n(&self, local: &Local, out: &mut [f64]) {
         let Some((_, inverse, _)) = self.points(local) else { return };
-        let mut spatial = [[[0.0; NODES]; POINTS]; 3];
-        let mut pulled = [[[0.0; NODES]; POINTS]; 3];
+        let (mut inverses, mut pulls) = (IDENTITIES, IDENTITIES);
         let mut coefficients = StiffnessCoefficients::ZERO;
-        let mut scales = [0.0; 3 * POINTS];
+        let mut scales = [0.0; POINTS];
         for (q, &weight) in self.geometry.weights(local.group).iter().enumerate() {
-            let rest = self.geometry.gradients(local.group, q);
-            let scale = weight * self.shear_kpa[local.group];
-            push_forward(&inverse[q], rest, q, &mut spatial);
-            push_forward(self.pull(local.group, q), rest, q, &mut pulled);
-            scales[3 * q..3 * q + 3].fill(scale);
-            coefficients.cross[q] = scale * self.barrier;
+            put_matrix(&mut inverses, q, &inverse[q]);
+            put_matrix(&mut pulls, q, self.pull(local.group, q));
+            scales[q] = weight * self.shear_kpa[local.group];
+            coefficients.cross[q] = scales[q] * self.barrier;
         }
+        let [mut spatial, mut rest, mut pulled] = [[[[0.0; NODES]; POINTS]; 3]; 3];
+        self.geometry.push_forward(local.group, &inverses, &mut spatial);
         self.geometry.add_stiffness(local.group, &spatial, &coefficients, None, out);
-        // In the order of the gradients: all components of a point, then the next.
-        let mut pulled_rows = [[0.0; NODES]; 3 * POINTS];
-        for (row, pulled_row) in pulled_rows.iter_mut().enumerate() {
-            *pulled_row = pulled[row % 3][row / 3];
-        }
+        self.geometry.rest_gradients(local.group, &mut rest);
+        self.geometry.push_forward(local.group, &pulls, &mut pulled);
         let mut isotropic = [[0.0; NODES]; NODES];
-        let right = self.geometry.gradient_rows(local.group);
         let base = self.geometry.base(local.group);
         let mut block = Block { rows: &mut isotropic, first: 0, step: 1 };
-        add_products(base, [Products { scales: &scales, left: &pulled_rows, right }], &mut block);
+        let sum = |k: usize| Products { scales: &scales, left: &pulled[k], right: &rest[k] };
+        add_products(base, [sum(0), sum(1), sum(2)], &mut block);
         add_isotropic(&isotropic, out);
     }
 }

@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use nalgebra::{Matrix3, Vector4};
 
-use super::{LANES, SolidGeometry};
+use super::{Base, LANES, NodeRows, PointRows, SolidGeometry};
 use crate::kernel::{Kernel, run_kernel};
 use crate::mesh::element::{MODES, NODES, POINTS, QUADRATURE};
 
@@ -21,13 +21,39 @@ pub(in crate::effects) type PointNumbers = [f64; PLACES];
 pub(in crate::effects) type PointMatrices = [[PointNumbers; 3]; 3];
 
 /// Gradients of the shape functions, indexed (component, node, point).
-pub(in crate::effects) type NodeGradients = [[PointNumbers; NODES]; 3];
+type NodeGradients = [[PointNumbers; NODES]; 3];
 
 /// The identity at each point.
 pub(in crate::effects) const IDENTITIES: PointMatrices = {
     let (one, zero) = ([1.0; PLACES], [0.0; PLACES]);
     [[one, zero, zero], [zero, one, zero], [zero, zero, one]]
 };
+
+/// Gradients ∂N/∂ξ of the shape functions on the reference element. All elements share them: their own would not stay in a cache.
+static REFERENCE_BY_NODE: LazyLock<NodeGradients> = LazyLock::new(|| {
+    let mut gradients = [[[0.0; PLACES]; NODES]; 3];
+    for (q, point) in QUADRATURE.iter().enumerate() {
+        for (a, shape) in point.shapes.iter().enumerate() {
+            for k in 0..3 {
+                gradients[k][a][q] = shape.gradient[k];
+            }
+        }
+    }
+    gradients
+});
+
+/// The same, a row for each component at each point.
+static REFERENCE_BY_POINT: LazyLock<[NodeRows; POINTS]> = LazyLock::new(|| {
+    let mut rows = [[[0.0; NODES]; 3]; POINTS];
+    for (rows, point) in rows.iter_mut().zip(&*QUADRATURE) {
+        for (a, shape) in point.shapes.iter().enumerate() {
+            for k in 0..3 {
+                rows[k][a] = shape.gradient[k];
+            }
+        }
+    }
+    rows
+});
 
 /// Pressure modes of the reference element, indexed (mode, point).
 pub(super) static MODE_VALUES: LazyLock<[PointNumbers; MODES]> = LazyLock::new(|| {
@@ -58,22 +84,67 @@ pub(in crate::effects) fn put_matrix(matrices: &mut PointMatrices, point: usize,
     }
 }
 
-/// Σ xₐ ⊗ Gₐ over the nodes at every point, for `current` positions x (component-major); what `out` holds beyond the last point stays.
+/// Σ xₐ ⊗ ∂Nₐ/∂ξ over the nodes at every point, for `current` positions x (component-major); what `out` holds beyond the last point stays. The nine sums of four points at a time stay in
+/// registers.
 #[inline(always)]
-pub(super) fn gradients_of(current: &[f64], gradients: &NodeGradients, out: &mut PointMatrices) {
+pub(super) fn reference_gradients_of(current: &[f64], out: &mut PointMatrices) {
+    let gradients = &*REFERENCE_BY_NODE;
     let position = current.as_chunks::<NODES>().0;
-    for k in 0..3 {
-        let mut sums = [[0.0; PLACES]; 3];
+    for place in 0..PLACES / LANES {
+        let mut sums = [[[0.0; LANES]; 3]; 3];
         for a in 0..NODES {
-            let gradient = &gradients[k][a];
-            for i in 0..3 {
-                for q in 0..PLACES {
-                    sums[i][q] = position[i][a].mul_add(gradient[q], sums[i][q]);
+            for k in 0..3 {
+                let gradient = &gradients[k][a].as_chunks::<LANES>().0[place];
+                for i in 0..3 {
+                    for lane in 0..LANES {
+                        sums[i][k][lane] = position[i][a].mul_add(gradient[lane], sums[i][k][lane]);
+                    }
                 }
             }
         }
+        let first = place * LANES;
+        let points = LANES.min(POINTS - first);
         for i in 0..3 {
-            out[i][k][..POINTS].copy_from_slice(&sums[i][..POINTS]);
+            for k in 0..3 {
+                out[i][k][first..first + points].copy_from_slice(&sums[i][k][..points]);
+            }
+        }
+    }
+}
+
+/// A B at every point.
+#[inline(always)]
+fn times(a: &PointMatrices, b: &PointMatrices, out: &mut PointMatrices) {
+    for i in 0..3 {
+        for k in 0..3 {
+            for q in 0..PLACES {
+                out[i][k][q] = a[i][0][q] * b[0][k][q] + a[i][1][q] * b[1][k][q] + a[i][2][q] * b[2][k][q];
+            }
+        }
+    }
+}
+
+/// A Bᵀ at every point.
+#[inline(always)]
+fn times_transposed(a: &PointMatrices, b: &PointMatrices, out: &mut PointMatrices) {
+    for i in 0..3 {
+        for k in 0..3 {
+            for q in 0..PLACES {
+                out[i][k][q] = a[i][0][q] * b[k][0][q] + a[i][1][q] * b[k][1][q] + a[i][2][q] * b[k][2][q];
+            }
+        }
+    }
+}
+
+/// A matrix at each point times the gradients on the reference element.
+#[inline(always)]
+fn rows_of(matrices: &PointMatrices, out: &mut PointRows) {
+    for (q, [x, y, z]) in REFERENCE_BY_POINT.iter().enumerate() {
+        for i in 0..3 {
+            let [a, b, c] = [matrices[i][0][q], matrices[i][1][q], matrices[i][2][q]];
+            for node in 0..NODES {
+                out[i][q][node] = a * x[node] + b * y[node] + c * z[node];
+            }
         }
     }
 }
@@ -101,10 +172,26 @@ pub(in crate::effects) fn determinants_and_cofactors(
 }
 
 impl SolidGeometry {
-    /// Deformation gradients F = Σ xₐ ⊗ Gₐ at the points of an element.
+    /// Deformation gradients F = Σ xₐ ⊗ Gₐ = (Σ xₐ ⊗ ∂Nₐ/∂ξ) J⁻¹ at the points of an element; beyond the last, what `out` holds is the identity and stays.
     #[inline(always)]
     pub(in crate::effects) fn deformation_gradients(&self, element: usize, current: &[f64], out: &mut PointMatrices) {
-        gradients_of(current, &self.by_node[element], out);
+        let mut reference = IDENTITIES;
+        reference_gradients_of(current, &mut reference);
+        times_transposed(&reference, &self.inverse_transposed[element], out);
+    }
+
+    /// Gradients G = J⁻ᵀ ∂N/∂ξ of the shape functions at rest, at the points of an element (1/mm).
+    #[inline(always)]
+    pub(in crate::effects) fn rest_gradients(&self, element: usize, out: &mut PointRows) {
+        rows_of(&self.inverse_transposed[element], out);
+    }
+
+    /// A matrix at each point times these gradients.
+    #[inline(always)]
+    pub(in crate::effects) fn push_forward(&self, element: usize, matrices: &PointMatrices, out: &mut PointRows) {
+        let mut products = IDENTITIES;
+        times(matrices, &self.inverse_transposed[element], &mut products);
+        rows_of(&products, out);
     }
 
     /// Projects point values on the pressure modes and back: the value of the projection at every point, zero beyond the last.
@@ -139,25 +226,38 @@ impl SolidGeometry {
     /// Adds Σ_q Gᵀ·stress: `stress` is the first Piola–Kirchhoff stress times the quadrature weight (mN·mm). What belongs to a base that does not move is left out.
     #[inline(always)]
     pub(in crate::effects) fn add_force(&self, element: usize, stress: &PointMatrices, out: &mut [f64]) {
-        let rows = out.as_chunks_mut::<NODES>().0;
-        for chunk in self.base(element).nodes() / LANES..NODES / LANES {
-            let mut sum = [[0.0; LANES]; 3];
-            for q in 0..POINTS {
-                let gradients = self.gradients(element, q);
-                for k in 0..3 {
-                    let gradient = &gradients[k].as_chunks::<LANES>().0[chunk];
-                    for i in 0..3 {
-                        for lane in 0..LANES {
-                            sum[i][lane] = stress[i][k][q].mul_add(gradient[lane], sum[i][lane]);
-                        }
+        let mut reference = IDENTITIES;
+        times(stress, &self.inverse_transposed[element], &mut reference);
+        match self.base(element) {
+            Base::Free => {
+                add_reference_force::<3>(&reference, 0, out);
+                add_reference_force::<2>(&reference, 3, out);
+            }
+            Base::Fixed => add_reference_force::<3>(&reference, 2, out),
+        }
+    }
+}
+
+/// Adds Σ_q stress ∂N/∂ξ to `VECTORS` vectors of nodes from `first` on, all of whose sums stay in registers: fewer would wait for one another.
+#[inline(always)]
+fn add_reference_force<const VECTORS: usize>(stress: &PointMatrices, first: usize, out: &mut [f64]) {
+    let mut sums = [[[0.0; LANES]; VECTORS]; 3];
+    for (q, rows) in REFERENCE_BY_POINT.iter().enumerate() {
+        for (k, row) in rows.iter().enumerate() {
+            let gradients = &row.as_chunks::<LANES>().0[first..first + VECTORS];
+            for i in 0..3 {
+                for v in 0..VECTORS {
+                    for lane in 0..LANES {
+                        sums[i][v][lane] = stress[i][k][q].mul_add(gradients[v][lane], sums[i][v][lane]);
                     }
                 }
             }
-            for i in 0..3 {
-                let out = &mut rows[i].as_chunks_mut::<LANES>().0[chunk];
-                for lane in 0..LANES {
-                    out[lane] += sum[i][lane];
-                }
+        }
+    }
+    for (sums, row) in sums.iter().zip(out.as_chunks_mut::<NODES>().0) {
+        for (sum, out) in sums.iter().zip(&mut row.as_chunks_mut::<LANES>().0[first..]) {
+            for lane in 0..LANES {
+                out[lane] += sum[lane];
             }
         }
     }

@@ -55,13 +55,11 @@ impl SolidGeometry {
         let StiffnessCoefficients { rest, cross, outer } = coefficients;
         let mut isotropic = [[0.0; NODES]; NODES];
         if rest.iter().any(|c| *c != 0.0) {
-            let gradients = self.gradient_rows(element);
-            let mut scales = [0.0; 3 * POINTS];
-            for (row, scale) in scales.iter_mut().enumerate() {
-                *scale = rest[row / 3];
-            }
-            let sum = Products { scales: &scales, left: gradients, right: gradients };
-            add_symmetric_products(base, [sum], &mut Block { rows: &mut isotropic, first: 0, step: 1 });
+            let mut gradients = [[[0.0; NODES]; POINTS]; 3];
+            self.rest_gradients(element, &mut gradients);
+            let sum = |k: usize| Products { scales: rest, left: &gradients[k], right: &gradients[k] };
+            let sums = [sum(0), sum(1), sum(2)];
+            add_symmetric_products(base, sums, &mut Block { rows: &mut isotropic, first: 0, step: 1 });
         }
         let mut both = [0.0; POINTS];
         for q in 0..POINTS {
