@@ -84,8 +84,7 @@ pub(in crate::effects) fn put_matrix(matrices: &mut PointMatrices, point: usize,
     }
 }
 
-/// Σ xₐ ⊗ ∂Nₐ/∂ξ over the nodes at every point, for `current` positions x (component-major); what `out` holds beyond the last point stays. The nine sums of four points at a time stay in
-/// registers.
+/// Σ xₐ ⊗ ∂Nₐ/∂ξ over the nodes at every point, for `current` positions x (component-major), and the identity beyond the last. The nine sums of four points at a time stay in registers.
 #[inline(always)]
 pub(super) fn reference_gradients_of(current: &[f64], out: &mut PointMatrices) {
     let gradients = &*REFERENCE_BY_NODE;
@@ -102,12 +101,15 @@ pub(super) fn reference_gradients_of(current: &[f64], out: &mut PointMatrices) {
                 }
             }
         }
-        let first = place * LANES;
-        let points = LANES.min(POINTS - first);
         for i in 0..3 {
             for k in 0..3 {
-                out[i][k][first..first + points].copy_from_slice(&sums[i][k][..points]);
+                out[i][k].as_chunks_mut::<LANES>().0[place] = sums[i][k];
             }
+        }
+    }
+    for i in 0..3 {
+        for k in 0..3 {
+            out[i][k][POINTS..].copy_from_slice(&IDENTITIES[i][k][POINTS..]);
         }
     }
 }
@@ -172,7 +174,7 @@ pub(in crate::effects) fn determinants_and_cofactors(
 }
 
 impl SolidGeometry {
-    /// Deformation gradients F = Σ xₐ ⊗ Gₐ = (Σ xₐ ⊗ ∂Nₐ/∂ξ) J⁻¹ at the points of an element; beyond the last, what `out` holds is the identity and stays.
+    /// Deformation gradients F = Σ xₐ ⊗ Gₐ = (Σ xₐ ⊗ ∂Nₐ/∂ξ) J⁻¹ at the points of an element, and the identity beyond the last.
     #[inline(always)]
     pub(in crate::effects) fn deformation_gradients(&self, element: usize, current: &[f64], out: &mut PointMatrices) {
         let mut reference = IDENTITIES;
