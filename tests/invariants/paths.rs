@@ -257,6 +257,21 @@ fn what_has_let_go_never_heals() {
     assert!(softer > 1e-4 && same.abs() < 1e-6 && damage(&strong[5]) == 0.0);
 }
 
+/// From whatever depth a needle lets go, the tissue is back within an iteration or two: it is not searched for from where the needle held it.
+#[test]
+fn tissue_that_is_let_go_springs_back_at_once() {
+    let scene = weak(0.0);
+    for depth_mm in [0.1, 0.1136, 0.1238, 0.1425, 0.16, 0.1697, 0.1748, 0.19, 0.2] {
+        let released = Step { time_s: 3.0, force_mn: Some(Vector3::zeros()), ..Step::default() };
+        let steps = vec![held(1.0, 0.0, 0.06), held(2.0, 0.0, depth_mm), released];
+        let outcomes = outcomes(&scene, &sequence(named(&["adhesion"]), steps), None);
+        let [pushed, let_go] = [&outcomes[1], &outcomes[2]].map(|outcome| &outcome.prediction);
+        assert!(largest_um(pushed) > 10.0, "{depth_mm}: {}", largest_um(pushed));
+        assert!(largest_um(let_go) < 1e-3, "{depth_mm}: {}", largest_um(let_go));
+        assert!(let_go.solver.iterations <= 2, "{depth_mm}: {}", let_go.solver.iterations);
+    }
+}
+
 #[test]
 fn a_bond_holds_more_against_haste_and_no_more_against_patience() {
     let pushed = |scene: &Arc<PreparedScene>, time_s: f64| {

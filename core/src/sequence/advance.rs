@@ -1,7 +1,7 @@
 //! One step of a simulation: where its mesh stands, what it starts from, its equilibrium, and what is remembered of it.
 //!
 //! The start is the state before, moved by the difference of what linear elasticity expects of the two steps: exact for small steps, as good as
-//! a fresh start for large ones. A needle that is held where it was starts from the state before as it is.
+//! a fresh start for large ones. A needle that is held where it was starts from the state before as it is, and tissue that nothing holds down any more from its rest.
 
 use std::sync::Arc;
 
@@ -199,7 +199,9 @@ impl Simulation {
         };
         let deflection = aim.contact.map_or_else(Vector3::zeros, |contact| contact.deflection);
         wall.place_tip(&mut expected, &(motion.direction.into_inner() * motion.travel_mm + deflection));
-        let start = self.start(&expected, &motion, unmoved);
+        // Without mass or fluid, tissue that is let go is back at once but for what its bond and its stresses remember.
+        let springs_back = withdrawn && !self.rates.inertia && !self.decision.bleb;
+        let start = if springs_back { expected.clone() } else { self.start(&expected, &motion, unmoved) };
         progress.stage("equilibrium");
         let coefficient = problem.friction_coefficient.filter(|_| !withdrawn);
         let load = Load { motion: &motion, touch_mm, additions: &pressing };
