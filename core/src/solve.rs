@@ -1,5 +1,5 @@
-//! Linear and nonlinear solution: the sparse and the dense Cholesky factorisation (the two places that name faer) and Newton's
-//! method on top of them.
+//! Linear and nonlinear solution: the sparse and the dense Cholesky factorisation (the two places that name faer, and `columns`, which takes what is too small for it) and
+//! Newton's method on top of them.
 
 mod border;
 mod columns;
