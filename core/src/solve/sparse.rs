@@ -60,12 +60,21 @@ const WIDEST_SMALL: usize = 600;
 #[derive(Debug)]
 pub struct SymbolicFactor {
     symbolic: SymbolicCholesky<u32>,
-    /// The lower triangle, checked once for all.
-    structure: SymbolicSparseColMat<u32>,
     supernodes: Vec<Supernode>,
-    /// Of factors that are small.
-    plan: Option<Plan>,
-    scratch: StackReq,
+    way: Way,
+}
+
+/// How factors of one pattern are computed.
+#[derive(Debug)]
+enum Way {
+    /// Small ones by `factorization`.
+    Small(Plan),
+    /// Large ones by faer.
+    Large {
+        /// The lower triangle, checked once for all.
+        structure: SymbolicSparseColMat<u32>,
+        scratch: StackReq,
+    },
 }
 
 impl SymbolicFactor {
@@ -84,17 +93,20 @@ impl SymbolicFactor {
         };
         let symbolic = factorize_symbolic_cholesky(matrix, Side::Upper, SymmetricOrdering::Identity, params)
             .map_err(|error| LinearSolveError::Analysis(error.to_string()))?;
-        let scratch = StackReq::any_of(&[
-            symbolic.factorize_numeric_llt_scratch::<f32>(Par::Seq, Spec::default()),
-            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
-        ]);
         let supernodes = numeric::supernodes(&symbolic);
         let mut supernodes = supernodes.ok_or_else(|| LinearSolveError::Analysis("no supernodes".to_string()))?;
         let widest = supernodes.iter().map(|supernode| supernode.columns).max().unwrap_or(0);
-        let plan = (widest <= WIDEST_SMALL).then(|| Plan::new(pattern, &mut supernodes));
-        let (starts, rows) = (pattern.column_starts.clone(), pattern.rows.clone());
-        let structure = SymbolicSparseColMat::new_checked(n, n, starts, None, rows);
-        Ok(SymbolicFactor { symbolic, structure, supernodes, plan, scratch })
+        let way = if widest <= WIDEST_SMALL {
+            Way::Small(Plan::new(pattern, &mut supernodes))
+        } else {
+            let (starts, rows) = (pattern.column_starts.clone(), pattern.rows.clone());
+            let scratch = StackReq::any_of(&[
+                symbolic.factorize_numeric_llt_scratch::<f32>(Par::Seq, Spec::default()),
+                symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()),
+            ]);
+            Way::Large { structure: SymbolicSparseColMat::new_checked(n, n, starts, None, rows), scratch }
+        };
+        Ok(SymbolicFactor { symbolic, supernodes, way })
     }
 
     /// Number of stored entries of the factor.
@@ -150,12 +162,16 @@ pub struct Factor {
 impl Factor {
     /// Memory for factors of `symbolic`.
     pub fn new(symbolic: &SymbolicFactor) -> Self {
+        let scratch = match symbolic.way {
+            Way::Small(_) => StackReq::EMPTY,
+            Way::Large { scratch, .. } => scratch,
+        };
         Factor {
             single: Numeric::empty(),
             double: Numeric::empty(),
             at_hand: Precision::Single,
             first: Precision::Single,
-            stack: MemBuffer::new(symbolic.scratch),
+            stack: MemBuffer::new(scratch),
             rounded: Vec::new(),
             residual: Vec::new(),
         }

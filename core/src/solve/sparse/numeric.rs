@@ -10,9 +10,9 @@ use faer::traits::RealField;
 use faer::{Par, Side, Spec};
 use pulp::Arch;
 
-use super::SymbolicFactor;
 use super::factorization::Factorization;
 use super::substitution::{Substitution, Supernode};
+use super::{SymbolicFactor, Way};
 use crate::kernel::run_kernel;
 use crate::solve::dense::Dense;
 use crate::solve::number::Number;
@@ -34,12 +34,15 @@ impl<T: RealField + Number + Into<f64>> Numeric<T> {
 
     /// Factorises the matrix with the entries `matrix` in the lower triangle; whether it is positive definite.
     pub fn factorize(&mut self, symbolic: &SymbolicFactor, matrix: &[f64], stack: &mut MemStack) -> bool {
-        let SymbolicFactor { symbolic, structure, supernodes, plan, .. } = symbolic;
+        let SymbolicFactor { symbolic, supernodes, way } = symbolic;
         let Numeric { values, memory, rounded } = self;
         values.resize(supernodes.last().map_or(0, |last| last.values.end), T::default());
-        if let Some(plan) = plan {
-            return Arch::new().dispatch(Factorization { plan, supernodes, matrix, values, memory });
-        }
+        let structure = match way {
+            Way::Small(plan) => {
+                return Arch::new().dispatch(Factorization { plan, supernodes, matrix, values, memory });
+            }
+            Way::Large { structure, .. } => structure,
+        };
         rounded.clear();
         rounded.extend(matrix.iter().map(|entry| T::nearest(*entry)));
         symbolic
