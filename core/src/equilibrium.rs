@@ -1,7 +1,7 @@
 //! The equilibrium of one contact on one mesh: needle, wall and force in; positions, travel and reaction out.
 //!
 //! Patch frame throughout. [`Wall`] is the meshed problem; [`Wall::solve`] finds its equilibrium from a start, directly if it can, by load
-//! steps if it must. Read on in `load` (what is asked and answered), `guide` (how the tip is held), `attempts` (ways to an equilibrium), `error` (why there is none), `light` (forces too small to move the tissue), `friction` (its repetition), `grip` (what it remembers),
+//! steps if it must. Read on in `load` (what is asked and answered), `guide` (how the tip is held), `attempts` (ways to an equilibrium), `error` (why there is none), `light` (forces too small to move the tissue), `rounding` (how well a balance can be known), `friction` (its repetition), `grip` (what it remembers),
 //! `bleb` (fluid under the retina), `reading` (what is read
 //! off), `settled` (the wall under pressure alone). Not here: how fine a mesh a level uses, where the mesh is centred.
 
@@ -14,6 +14,7 @@ mod guide;
 mod light;
 mod load;
 mod reading;
+mod rounding;
 pub mod settled;
 
 use nalgebra::{Point3, Unit, Vector3};
@@ -40,6 +41,8 @@ pub struct Wall<'a> {
     tool: Tool<'a>,
     /// Radius of the rim (mm).
     rim_mm: f64,
+    /// Largest stiffness λ + 2µ of a layer over its thickness.
+    stiffest_kpa_per_mm: f64,
     /// Positions without the needle's contact, where they are not those at rest.
     settled: Option<Vec<f64>>,
     /// Force of the pressure on the whole surface (mN).
@@ -83,6 +86,8 @@ impl<'a> Wall<'a> {
             lambda: layers[layer].layer.first_lame_kpa(),
         };
         let materials = topology.element_layer.iter().map(|&layer| lame(layer)).collect();
+        let stiffness = |layer: usize| (lame(layer).lambda + 2.0 * lame(layer).mu) / layers[layer].layer.thickness_mm;
+        let stiffest_kpa_per_mm = (0..layers.len()).map(stiffness).fold(0.0, f64::max);
         let faces = ContactFaces::new(&topology.faces, &geometry.rest, contact.points_per_edge);
         let rim_mm = mesh.disc.radii.last().copied().unwrap_or_default();
         Ok(Wall {
@@ -94,6 +99,7 @@ impl<'a> Wall<'a> {
             contact,
             tool,
             rim_mm,
+            stiffest_kpa_per_mm,
             settled: None,
             pressure_force_mn: 0.0,
             bears_strain: f64::INFINITY,

@@ -3,14 +3,23 @@
 //! Iterations: the linear answer is as good a start for these as for the default tissue (6), but for a stiff membrane, which it takes as flat.
 
 use retina_core::needle::NeedleShape;
+use retina_core::scene::Scene;
 use retina_core::tissue::{Layer, Tissue};
 
-use crate::table::{Case, Expect::*, all, case, lean, push, run, tissue};
+use crate::table::{Case, Expect::*, all, built_in, case, lean, push, run, tissue};
 
 const BALL: NeedleShape = NeedleShape { radius_mm: 0.257, tip: retina_core::needle::Tip::Hemispherical };
 
 fn membrane(tissue: &mut Tissue, thickness_mm: f64, youngs_modulus_kpa: f64) {
     tissue.inner_limiting_membrane = Some(Layer { thickness_mm, youngs_modulus_kpa, poisson_ratio: 0.49 });
+}
+
+/// The macula with a membrane of 1 µm, ten times as stiff as the retina, with this Poisson ratio.
+fn over_the_macula(poisson_ratio: f64) -> Scene {
+    let mut scene = built_in("macula");
+    scene.tissue.inner_limiting_membrane =
+        Some(Layer { thickness_mm: 0.001, youngs_modulus_kpa: 200.0, poisson_ratio });
+    scene
 }
 
 fn moduli(tissue: &mut Tissue, retina: f64, choroid: f64, sclera: f64) {
@@ -71,8 +80,15 @@ const CASES: &[Case] = &[
         "membrane 1 µm, 1000 times, light touch",
         || tissue(|t| membrane(t, 0.001, 20_000.0)),
         || push(BALL, 0.02),
-        Answer(20),
+        Answer(3),
     ),
+    case(
+        "membrane 1 µm, 1000 times, hardly a touch",
+        || tissue(|t| membrane(t, 0.001, 20_000.0)),
+        || push(BALL, 1e-4),
+        Answer(3),
+    ),
+    case("membrane 1 µm, ν 0.4999, curved, light touch", || over_the_macula(0.4999), || push(BALL, 0.02), Answer(4)),
     case("membrane 70 nm, 10 times", || tissue(|t| membrane(t, 7e-5, 200.0)), || push(BALL, 0.5), Answer(5)),
     case("membrane 4 µm, 1000 times", || tissue(|t| membrane(t, 0.004, 20_000.0)), || push(BALL, 0.5), Answer(8)),
     case(

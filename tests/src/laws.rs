@@ -21,10 +21,13 @@ pub const PENETRATION_MM: f64 = PENETRATION_WARNING_MM;
 const RESIDUAL: f64 = 1e-7;
 /// Smallest force scale over the stiffness λ + 2µ of the tissue's stiffest layer (mN/kPa): the rounding of stretches (1e-15) acting on a mesh of at most 3 mm radius, over [`RESIDUAL`].
 const SCALE_PER_STIFFNESS: f64 = 1e-15 * 9.0 / RESIDUAL;
-/// A force below this is lost in the rounding of thin or stiff layers up to [`LIGHT_SHARE`] of itself (mN).
-const LIGHT_MN: f64 = 1e-5;
-/// See [`LIGHT_MN`].
-const LIGHT_SHARE: f64 = 1e-3;
+/// Residual that the rounding of coordinates leaves over the shear modulus over thickness of a layer (mN mm/kPa): 1e-15 of a coordinate of 2 mm, over
+/// 2 mm² of the layer.
+const RESIDUAL_PER_SHEAR: f64 = 1e-15 * 4.0;
+/// The same over Lamé's first modulus over thickness: layers are nearly level, so that coordinates along them change a volume by little.
+const RESIDUAL_PER_VOLUME: f64 = 1e-15;
+/// No more of a force may be lost in that.
+const LOST_SHARE: f64 = 1e-3;
 /// Force scale under pose control (mN): that of a light touch.
 const POSE_SCALE_MN: f64 = 0.01;
 /// Force scale in a wall under pressure over the pressure (mN/kPa): 1e-5 of the mesh's area, at most that of a disc of 3 mm radius.
@@ -79,19 +82,23 @@ pub fn broken(scene: &Scene, request: &Request, answer: &Prediction) -> Vec<Stri
             broken.push(format!("fluid of {:?} came to {found:?}", fluid.filling));
         }
     }
-    let light_mn = match request.control {
-        Control::Force(force) if force.norm() < LIGHT_MN => LIGHT_SHARE * force.norm(),
-        _ => 0.0,
+    let rounding = |layer: &Layer| {
+        (RESIDUAL_PER_SHEAR * layer.shear_modulus_kpa() + RESIDUAL_PER_VOLUME * layer.first_lame_kpa())
+            / layer.thickness_mm
     };
-    if answer.solver.residual_mn > (RESIDUAL * scale_mn).max(light_mn) {
+    let largest_mn = scene.tissue.layers().iter().map(|named| rounding(&named.layer)).fold(0.0, f64::max);
+    let rounded_mn = largest_mn.min(LOST_SHARE * scale_mn);
+    if answer.solver.residual_mn > (RESIDUAL * scale_mn).max(rounded_mn) {
         broken.push(format!("a residual of {:e} mN is left", answer.solver.residual_mn));
     }
     if let Control::Force(force) = request.control
         && answer.contact.state != ContactState::Clear
     {
         let missing = (answer.needle.reaction_mn.dot(&force.normalize()) + force.norm()).abs();
-        let allowed =
-            if request.level == Level::Linear { BALANCE * force.norm() } else { (BALANCE * scale_mn).max(light_mn) };
+        let allowed = match request.level {
+            Level::Linear => BALANCE * force.norm(),
+            _ => BALANCE / RESIDUAL * (RESIDUAL * scale_mn).max(rounded_mn),
+        };
         if missing > allowed {
             broken.push(format!("the reaction misses {missing:e} mN of the force of {:e} mN", force.norm()));
         }

@@ -34,10 +34,7 @@ pub(super) struct Attempt {
 const SOFTENED_TOLERANCE: f64 = 1e-3;
 /// Force scale under pose control (mN): that of a light touch.
 const POSE_FORCE_SCALE_MN: f64 = 0.01;
-/// Rounding of the tissue's forces over stiffness (λ + 2µ) times squared width of the mesh: stretches are known to a few times 1e-16, and a stress
-/// acts on a piece of the mesh. No residual is asked to be smaller.
-const ROUNDING: f64 = 1e-15;
-/// The same in a wall under pressure, over the force of the pressure on the whole surface.
+/// Smallest force scale in a wall under pressure, over the force of the pressure on the whole surface.
 const SMALLEST_FORCE_SHARE: f64 = 1e-5;
 /// Iterations of a direct attempt that may find the tissue about to buckle: those that came to rest took ten at most.
 const DIRECT_WEAKENED: usize = 15;
@@ -311,28 +308,34 @@ impl Wall<'_> {
         let smallest = (self.rounding_mn() / self.contact.tolerance).max(SMALLEST_FORCE_SHARE * self.pressure_force_mn);
         let force_mn = load.motion.force_mn.unwrap_or(POSE_FORCE_SCALE_MN);
         let scale = force_mn.max(smallest);
-        let light_mn = self.light_residual_mn(&terms[0], force_mn);
-        let settings = NewtonSettings {
+        let wanted_mn = tolerance * scale;
+        let lost_at_most_mn = self.lost_at_most_mn(force_mn);
+        let mut settings = NewtonSettings {
             globalization: attempt.globalization,
             precision: attempt.precision,
             force_scale_mn: scale,
-            tolerance_mn: (tolerance * scale).max(light_mn),
+            tolerance_mn: wanted_mn.max(lost_at_most_mn),
             max_iterations: attempt.max_iterations.min(MOST_ITERATIONS.saturating_sub(*spent)),
             max_weakened: attempt.max_weakened,
             max_travel_mm: attempt.travel_share * MAX_TRAVEL_PER_RADIUS * self.tool.body.radius_mm(),
         };
-        let solved = match attempt.resumes {
+        let mut counted = |solved: Result<NewtonReport, NewtonError>| {
+            *spent += solved.as_ref().map_or_else(NewtonError::iterations, |report| report.iterations);
+            solved
+        };
+        let mut report = counted(match attempt.resumes {
             true => system.resume(positions, drive, &settings, workspace, progress),
             false => system.solve(positions, drive, &settings, workspace, progress),
-        };
-        *spent += solved.as_ref().map_or_else(NewtonError::iterations, |report| report.iterations);
-        solved
-    }
-
-    /// What rounding leaves of the balance of forces (mN).
-    fn rounding_mn(&self) -> f64 {
-        let stiffest_kpa = self.materials.iter().map(|lame| lame.lambda + 2.0 * lame.mu).fold(0.0, f64::max);
-        ROUNDING * stiffest_kpa * self.rim_mm * self.rim_mm
+        })?;
+        if lost_at_most_mn > wanted_mn && report.residual_mn > wanted_mn {
+            settings.tolerance_mn = wanted_mn.max(self.lost_mn(&terms, positions).min(lost_at_most_mn));
+            settings.max_iterations = settings.max_iterations.saturating_sub(report.iterations);
+            report += counted(match report.iterations {
+                0 => system.solve(positions, drive, &settings, workspace, progress),
+                _ => system.resume(positions, drive, &settings, workspace, progress),
+            })?;
+        }
+        Ok(report)
     }
 
     pub(super) fn equilibrium(

@@ -3,24 +3,15 @@
 //! There the tissue hardly yields and the contact law alone decides: its force grows with the square of the approach d, from nothing at the smoothing
 //! distance on. Newton's method from a much larger d only halves it in each step and, once it has lost the last point of the contact, has no stiffness to go by. So the
 //! travel is found first, on the tissue as it starts: the force of the contact is a rising function of it.
-//! So light a force also meets the rounding of the tissue's own forces, which is measured where it should be nothing: without a load.
 //! Not here: the equilibrium, which starts from this travel.
 
 use nalgebra::Vector3;
 
 use super::{Motion, Wall};
-use crate::assemble::{Scratch, gradient};
-use crate::effect::{Local, Term};
-use crate::solve::sparse::norm;
+use crate::effect::Local;
 
 /// Bisections of the travel: from the smoothing distance to a billionth of it.
 const BISECTIONS: usize = 40;
-/// Forces below this are held against the measured rounding (mN).
-const LIGHT_MN: f64 = 1e-5;
-/// Rounding at an equilibrium over that measured at rest, where many terms are exactly zero.
-const MORE_THAN_AT_REST: f64 = 8.0;
-/// Largest share of the force that may be left out of balance for rounding's sake.
-const LARGEST_SHARE: f64 = 1e-3;
 
 impl Wall<'_> {
     /// The travel at which the contact on the tissue at `positions` bears `force_mn`, near first touch at `touch_mm` (mm).
@@ -38,17 +29,6 @@ impl Wall<'_> {
             }
         }
         high
-    }
-
-    /// What the rounding of the forces of `solid` may leave out of balance under so light a force (mN); 0 where the force is not light.
-    pub(super) fn light_residual_mn(&self, solid: &Term, force_mn: f64) -> f64 {
-        if force_mn >= LIGHT_MN {
-            return 0.0;
-        }
-        let dofs = &self.topology.dofs;
-        let mut residual = vec![0.0; dofs.free + 3];
-        gradient(std::slice::from_ref(solid), &self.start(), dofs, &mut Scratch::default(), &mut residual);
-        (MORE_THAN_AT_REST * norm(&residual)).min(LARGEST_SHARE * force_mn)
     }
 
     /// Force of the contact against the motion along `direction` (mN).
