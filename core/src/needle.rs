@@ -7,6 +7,7 @@
 
 pub mod body;
 pub mod gauge;
+mod rays;
 pub mod shaft;
 pub mod shape;
 mod underside;

@@ -16,6 +16,7 @@
 //! Not here: the underside as a profile (`underside`), poses (`needle`).
 
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
+use pulp::Simd;
 
 use super::shape::{NeedleShape, Tip};
 
@@ -160,20 +161,33 @@ impl Body {
         (Vector3::new(radial.0, radial.1, 0.0), Vector3::new(self.plane_normal.0, 0.0, self.plane_normal.1))
     }
 
-    /// [`distance`](Self::distance), mm, and its slope along `direction` (needle-local, per unit of its length).
-    pub(super) fn distance_along(&self, local: &Point3<f64>, direction: &Vector3<f64>) -> (f64, f64) {
-        let Coordinates { outside_cylinder: a, beyond_plane: b, radial, .. } = self.coordinates(local);
-        let a_slope = radial.0 * direction.x + radial.1 * direction.y;
-        let b_slope = self.plane_normal.0 * direction.x + self.plane_normal.1 * direction.z;
-        let (reach, slope) = if a > 0.0 && b > 0.0 {
-            let reach = (a * a + b * b).sqrt().max(self.smoothing);
-            (reach, (a * a_slope + b * b_slope) / reach)
-        } else if a > b {
-            (a, a_slope)
-        } else {
-            (b, b_slope)
-        };
-        (reach - self.edge_radius, slope)
+    /// [`distance`](Self::distance) of a point in each lane, mm, and its slope along `direction` (needle-local, per unit of its length).
+    #[inline(always)]
+    pub(super) fn distances_along<S: Simd>(
+        &self,
+        simd: S,
+        [x, y, z]: &[S::f64s; 3],
+        direction: &[S::f64s; 3],
+    ) -> (S::f64s, S::f64s) {
+        let zero = simd.splat_f64s(0.0);
+        let from_axis = simd.sub_f64s(*x, simd.splat_f64s(self.axis_x));
+        let smoothed = simd.splat_f64s(self.smoothing * self.smoothing);
+        let axis_distance = simd.sqrt_f64s(simd.add_f64s(products(simd, from_axis, from_axis, *y, *y), smoothed));
+        let a = simd.sub_f64s(axis_distance, simd.splat_f64s(self.core_radius));
+        let a_slope = simd.div_f64s(products(simd, from_axis, direction[0], *y, direction[1]), axis_distance);
+        let (normal_x, normal_z) = (simd.splat_f64s(self.plane_normal.0), simd.splat_f64s(self.plane_normal.1));
+        let past_x = simd.sub_f64s(*x, simd.splat_f64s(self.corner.0));
+        let past_z = simd.sub_f64s(*z, simd.splat_f64s(self.corner.1));
+        let b = products(simd, normal_x, past_x, normal_z, past_z);
+        let b_slope = products(simd, normal_x, direction[0], normal_z, direction[2]);
+        let beyond_both = simd.sqrt_f64s(products(simd, a, a, b, b));
+        let beyond_both = simd.max_f64s(beyond_both, simd.splat_f64s(self.smoothing));
+        let both_slope = simd.div_f64s(products(simd, a, a_slope, b, b_slope), beyond_both);
+        let on_side = simd.less_than_f64s(b, a);
+        let outside = simd.and_m64s(simd.less_than_f64s(zero, a), simd.less_than_f64s(zero, b));
+        let reach = simd.select_f64s(outside, beyond_both, simd.select_f64s(on_side, a, b));
+        let slope = simd.select_f64s(outside, both_slope, simd.select_f64s(on_side, a_slope, b_slope));
+        (simd.sub_f64s(reach, simd.splat_f64s(self.edge_radius)), slope)
     }
 
     /// Signed distance with gradient and Hessian at a needle-local point; finite everywhere, the axis included.
@@ -236,4 +250,10 @@ impl Body {
         let z = self.corner.1 + (b - mx * (x - self.corner.0)) / mz;
         Some(Point3::new(x, axis_distance * radial.1, z))
     }
+}
+
+/// `a b + c d`.
+#[inline(always)]
+fn products<S: Simd>(simd: S, a: S::f64s, b: S::f64s, c: S::f64s, d: S::f64s) -> S::f64s {
+    simd.add_f64s(simd.mul_f64s(a, b), simd.mul_f64s(c, d))
 }

@@ -3,15 +3,13 @@
 //! Contract: heights are measured along the outward direction from the plane that touches the needle's foremost point, and averaged
 //! around an axis, because a contact law that knows one radius needs one height. Exact to 1e-6 mm. Units: mm.
 //!
-//! The body is convex, so along a ray from that plane the distance falls to its first zero as a convex function: Newton's method
-//! from before the zero never passes it, from just inside it steps back before it, and a distance that stops falling is a miss. From
-//! one radius to the next a parabola through the last heights gives the start, so one or two steps are the rule. A ball needs none, and is the same all around.
-//!
-//! Not here: the contact law.
+//! Not here: the contact law, where a ray meets the needle (`rays`).
 
 use nalgebra::{Point3, Unit, Vector3};
+use pulp::Arch;
 
 use super::body::Body;
+use super::rays::Rays;
 
 /// Azimuths over which a height is averaged.
 const AZIMUTHS: usize = 16;
@@ -19,39 +17,8 @@ const AZIMUTHS: usize = 16;
 /// Share of the azimuths that must meet the needle for a height to be finite.
 const LEAST_HITS: f64 = 0.5;
 
-/// A ray has arrived when its step is below this, mm: a tenth of the accuracy promised, for rays that graze and only halve the way.
-const STEP_TOLERANCE_MM: f64 = 1e-7;
-
-/// Newton steps after which a grazing ray counts as a miss.
-const STEP_LIMIT: usize = 60;
-
 /// Two directions closer than this are the same one, two lengths closer than this (mm) too.
 const ALIGNED: f64 = 1e-12;
-
-/// The way from one radius to the next along an azimuth.
-#[derive(Clone, Copy, Default)]
-struct Walk {
-    /// Radius and height of the last three hits, mm; the newest last.
-    hits: [(f64, f64); 3],
-    hit_count: usize,
-}
-
-impl Walk {
-    /// The height expected at `radius`, mm: on the parabola through the last three hits.
-    fn guess(&self, radius: f64) -> f64 {
-        let [(r0, h0), (r1, h1), (r2, h2)] = self.hits;
-        if self.hit_count < 3 || r0 == r1 || r1 == r2 {
-            return h2;
-        }
-        let (first, second) = ((h1 - h0) / (r1 - r0), (h2 - h1) / (r2 - r1));
-        h2 + (radius - r2) * (second + (radius - r1) * (second - first) / (r2 - r0))
-    }
-
-    fn record(&mut self, radius: f64, height: f64) {
-        self.hits = [self.hits[1], self.hits[2], (radius, height)];
-        self.hit_count += 1;
-    }
-}
 
 impl Body {
     /// The needle's height above its foremost point at each of `radii_mm` from the line through `about` along `inward_local`,
@@ -140,27 +107,19 @@ impl Body {
         let centred = self.is_round() && (about - lowest).norm() < ALIGNED;
         let ball = radii_mm.iter().map_while(|&radius| self.height_on_ball(&(base + across * radius), &up));
         let ball: Vec<f64> = ball.take(if centred { radii_mm.len() } else { 0 }).collect();
-        let walk = |(direction, weight): (Vector3<f64>, f64)| {
-            let mut walk = Walk::default();
-            let mut heights = Vec::with_capacity(radii_mm.len());
-            heights.extend_from_slice(&ball);
-            let mut previous = 0.0;
-            for &radius in &radii_mm[ball.len()..] {
-                if radius < previous {
-                    walk = Walk::default();
-                }
-                previous = radius;
-                match self.height_on_ray(&(base + direction * radius), &up, walk.guess(radius)) {
-                    Some(height) => {
-                        walk.record(radius, height);
-                        heights.push(height);
-                    }
-                    None => break,
-                }
-            }
-            (weight, heights)
-        };
-        Some(self.azimuths(&up, &across, &base).into_iter().map(walk).collect())
+        let (directions, weights): (Vec<_>, Vec<_>) = self.azimuths(&up, &across, &base).into_iter().unzip();
+        let rest = Rays { body: self, base, up, directions: &directions, radii_mm: &radii_mm[ball.len()..] };
+        let met = Arch::new().dispatch(rest);
+        Some(weights.into_iter().zip(met).map(|(weight, met)| (weight, [ball.as_slice(), &met].concat())).collect())
+    }
+
+    /// The height at which the ray from `origin` along `up` meets the ball of a round tip, mm; `None` where it misses it or meets the shaft first.
+    fn height_on_ball(&self, origin: &Point3<f64>, up: &Vector3<f64>) -> Option<f64> {
+        let from_centre = origin - Point3::new(0.0, 0.0, self.edge_radius);
+        let towards = -from_centre.dot(up);
+        let half_chord_squared = towards * towards - (from_centre.norm_squared() - self.edge_radius * self.edge_radius);
+        let height = towards - half_chord_squared.max(0.0).sqrt();
+        (half_chord_squared >= 0.0 && from_centre.z + height * up.z <= 0.0).then_some(height)
     }
 
     /// The lateral directions to walk and the share of each in the average; mirrored and equal directions are walked once.
@@ -184,43 +143,6 @@ impl Body {
                 (across * cos + aside * sin, weight)
             })
             .collect()
-    }
-
-    /// Height at which the ray from `origin` along `up` first meets the needle, mm; `None` when it misses.
-    fn height_on_ray(&self, origin: &Point3<f64>, up: &Vector3<f64>, guess: f64) -> Option<f64> {
-        let on_ball = if self.is_round() { self.height_on_ball(origin, up) } else { None };
-        if on_ball.is_some() {
-            return on_ball;
-        }
-        // A guess may lie beyond the needle, where the distance no longer falls; the touching plane never does.
-        self.advance(origin, up, guess).or_else(|| self.advance(origin, up, 0.0))
-    }
-
-    /// The same for a ball, `None` where the ray misses it or meets the shaft first.
-    fn height_on_ball(&self, origin: &Point3<f64>, up: &Vector3<f64>) -> Option<f64> {
-        let from_centre = origin - Point3::new(0.0, 0.0, self.edge_radius);
-        let towards = -from_centre.dot(up);
-        let half_chord_squared = towards * towards - (from_centre.norm_squared() - self.edge_radius * self.edge_radius);
-        let height = towards - half_chord_squared.max(0.0).sqrt();
-        (half_chord_squared >= 0.0 && from_centre.z + height * up.z <= 0.0).then_some(height)
-    }
-
-    /// Newton's method from a start on the ray; `None` where the distance does not fall along the ray.
-    fn advance(&self, origin: &Point3<f64>, up: &Vector3<f64>, start: f64) -> Option<f64> {
-        let mut height = start;
-        for _ in 0..STEP_LIMIT {
-            let (distance, slope) = self.distance_along(&(origin + up * height), up);
-            if slope >= 0.0 {
-                return None;
-            }
-            let step = -distance / slope;
-            height += step;
-            // What a step leaves is half its square times curvature over slope; nothing is curved by more than two edges.
-            if step.abs() < STEP_TOLERANCE_MM || step * step < STEP_TOLERANCE_MM * self.edge_radius * -slope {
-                return Some(height);
-            }
-        }
-        None
     }
 }
 
