@@ -83,7 +83,7 @@ pub const RIM_WARNING_MM: f64 = 0.6;
 /// A scene with everything that depends on it alone. Shared between threads.
 pub struct PreparedScene {
     scene: Scene,
-    beds: Beds,
+    beds: Arc<Beds>,
     /// The patch, where it does not depend on the contact.
     patch: Option<Patch>,
     /// What the networks need of it.
@@ -104,21 +104,19 @@ impl PreparedScene {
     /// # Errors
     /// [`PredictError::OutOfRange`] naming the field.
     pub fn new(scene: Scene) -> Result<Self, PredictError> {
-        Self::with_networks(scene, Networks::shipped())
-    }
-
-    /// As [`PreparedScene::new`], with other networks.
-    ///
-    /// # Errors
-    /// [`PredictError::OutOfRange`] naming the field.
-    pub fn with_networks(scene: Scene, networks: Arc<Networks>) -> Result<Self, PredictError> {
         scene.validate()?;
         let patch = match scene.surface {
             SceneSurface::Mesh(_) => None,
             _ => Some(scene.patch(&Point3::origin())?),
         };
         let rest = patch.as_ref().map(RestPatch::new);
-        Ok(PreparedScene { beds: Beds::new(&scene), scene, patch, rest, networks })
+        Ok(PreparedScene { beds: Arc::new(Beds::new(&scene)), scene, patch, rest, networks: Networks::shipped() })
+    }
+
+    /// The same scene with other networks, sharing what is prepared.
+    pub fn with_networks(&self, networks: Arc<Networks>) -> Self {
+        let PreparedScene { scene, beds, patch, rest, .. } = self;
+        PreparedScene { scene: scene.clone(), beds: beds.clone(), patch: patch.clone(), rest: rest.clone(), networks }
     }
 
     /// The scene.

@@ -167,7 +167,7 @@ fn what_was_not_learned_is_refused_by_name() {
 #[test]
 fn without_usable_weights_the_other_levels_answer() {
     let networks = Arc::new(Networks::read(b"not weights", b""));
-    let scene = PreparedScene::with_networks(Scene::built_in("macula").unwrap(), networks).unwrap();
+    let scene = built_in("macula").with_networks(networks);
     for level in [Level::Linear, Level::Coarse] {
         assert!(ask(&scene, &straight(level, 0.5)).is_ok());
     }

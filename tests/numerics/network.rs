@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 use retina_core::needle::NeedleShape;
 use retina_core::network::activation::activate;
-use retina_core::network::contact::{ContactNetwork, Memory, Start};
+use retina_core::network::contact::{ContactNetwork, Memory, QUANTILES, STRAIN, Start, strain_bin};
 use retina_core::network::features::{BASIS, Features};
 use retina_core::network::graph::Graph;
 use retina_core::network::input::{Answer, Input, Relief, TissueNumbers};
@@ -254,7 +254,8 @@ fn the_fast_path_agrees_with_plain_loops() {
             affine(&hidden, &take("output.weight"), &take("output.bias"), hidden.len())
         };
         let mut quantiles = head("quantile");
-        quantiles.iter_mut().zip(take("quantile.shift")).for_each(|(quantile, shift)| *quantile += shift);
+        let shift = &take("quantile.shift")[strain_bin(features.global[STRAIN]) * QUANTILES..];
+        quantiles.iter_mut().zip(shift).for_each(|(quantile, shift)| *quantile += shift);
         let (coefficients, motion, logarithms) = memory.answered();
         assert_eq!(coefficients.len(), NODE_COUNT * BASIS);
         for (fast, plain) in [(coefficients, &out), (motion, &head("motion")), (logarithms, &quantiles)] {

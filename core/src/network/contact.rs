@@ -6,7 +6,7 @@
 //! u  = start + scale Σ cₖ basisₖ,   c = x W + b
 //! p  = Σ poolᵢ xᵢ
 //! travel, reaction = those of the start, corrected by m = a([p, global] W + b) W' + b'
-//! error quantiles  = depth exp(q),   q = a([p, global] W + b) W' + b' + shift
+//! error quantiles  = depth exp(q),   q = a([p, global] W + b) W' + b' + shift of the mean strain's bin
 //! ```
 //!
 //! Inputs are standardised; the normaliser is folded into the first layer when the weights are read. The reaction keeps what equilibrium
@@ -76,6 +76,7 @@ pub struct ContactNetwork {
     out_bias: Vec<f32>,
     motion: Head,
     quantile: Head,
+    /// What the quantiles' logarithms lack on the validation, by bins of strain.
     shift: Vec<f32>,
     /// Quantiles of the error over the depth by bins of tip and strain, and the strains of the training.
     prior: Vec<f32>,
@@ -124,8 +125,10 @@ pub struct Corrected {
 pub const MOTION: usize = 1 + SIDES;
 /// Numbers that the quantiles' head answers.
 pub const QUANTILES: usize = 2;
-/// Upper ends of the bins of mean strain of [`ContactNetwork::prior`]; the last bin has none.
-pub const PRIOR_STRAINS: [f32; 2] = [0.1, 0.3];
+/// Upper ends of the bins of mean strain in which bounds are set right and [`ContactNetwork::prior`] is kept; the last bin has none.
+const STRAIN_ENDS: [f32; 2] = [0.1, 0.3];
+/// Number of these bins.
+pub const STRAIN_BINS: usize = STRAIN_ENDS.len() + 1;
 /// Tips with and without an edge.
 pub const TIP_BINS: usize = 2;
 /// Place of the mean strain among a request's numbers.
@@ -133,7 +136,7 @@ pub const STRAIN: usize = 2;
 
 /// The bin of a mean strain.
 pub fn strain_bin(strain: f32) -> usize {
-    PRIOR_STRAINS.iter().filter(|&&end| strain >= end).count()
+    STRAIN_ENDS.iter().filter(|&&end| strain >= end).count()
 }
 
 /// A request is known where its numbers leave the extremes of the training by at most this share of their range.
@@ -179,8 +182,8 @@ impl ContactNetwork {
             out_bias: weights.take("output.bias", &[BASIS])?,
             motion: Head::new(&weights, "motion", width + globals, MOTION)?,
             quantile: Head::new(&weights, "quantile", width + globals, QUANTILES)?,
-            shift: weights.take("quantile.shift", &[QUANTILES])?,
-            prior: weights.take("prior", &[TIP_BINS, PRIOR_STRAINS.len() + 1, QUANTILES])?,
+            shift: weights.take("quantile.shift", &[STRAIN_BINS, QUANTILES])?,
+            prior: weights.take("prior", &[TIP_BINS, STRAIN_BINS, QUANTILES])?,
             low: weights.take("range.global.low", &[globals])?,
             high: weights.take("range.global.high", &[globals])?,
             global_mean,
@@ -195,7 +198,7 @@ impl ContactNetwork {
 
     /// Quantiles of the worst node's error over the depth before anything is computed: those of the validation in the bin of tip and strain.
     pub fn prior(&self, edged: bool, strain: f32) -> [f32; QUANTILES] {
-        let bin = usize::from(edged) * (PRIOR_STRAINS.len() + 1) + strain_bin(strain);
+        let bin = usize::from(edged) * STRAIN_BINS + strain_bin(strain);
         [0, 1].map(|k| self.prior[bin * QUANTILES + k])
     }
 
@@ -289,7 +292,8 @@ impl ContactNetwork {
         seen("pooled", 0, pooled);
         self.motion.forward(pooled, sum, motion);
         self.quantile.forward(pooled, sum, quantiles);
-        quantiles.iter_mut().zip(&self.shift).for_each(|(quantile, shift)| *quantile += shift);
+        let shift = &self.shift[strain_bin(features.global[STRAIN]) * QUANTILES..];
+        quantiles.iter_mut().zip(shift).for_each(|(quantile, shift)| *quantile += shift);
         seen("motion", 0, motion);
         seen("quantile", 0, quantiles);
     }

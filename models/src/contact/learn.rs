@@ -3,10 +3,11 @@
 use std::cell::RefCell;
 
 use rayon::prelude::*;
-use retina_core::network::contact::{PRIOR_STRAINS, QUANTILES, Start, TIP_BINS, strain_bin};
+use retina_core::network::contact::{QUANTILES, STRAIN_BINS, Start, TIP_BINS, strain_bin};
 use retina_core::network::features::Features;
 
-use super::loss::{LEVELS, loss, of_motion, worst_um};
+use super::bounds;
+use super::loss::{loss, of_motion};
 use super::network::{Form, Network, Pass, Slopes};
 use super::prepared::{Normaliser, Prepared};
 use crate::describe;
@@ -25,13 +26,6 @@ pub struct ContactLearner {
     global: Normaliser,
     train: Vec<Prepared>,
     validation: Vec<Prepared>,
-}
-
-/// Of n numbers the ⌈p (n + 1)⌉-th smallest, where there are as many.
-fn conformal(mut numbers: Vec<f32>, level: f32) -> Option<f32> {
-    numbers.sort_by(f32::total_cmp);
-    let rank = (f64::from(level) * (numbers.len() + 1) as f64).ceil() as usize;
-    numbers.get(rank.wrapping_sub(1)).copied()
 }
 
 thread_local! {
@@ -62,56 +56,15 @@ impl ContactLearner {
         &self.validation
     }
 
-    /// The logarithms of the worst node's error over the depth, less the predicted quantiles, for every sample of the validation split.
-    fn surprises(&self, parameters: &[f32]) -> [Vec<f32>; QUANTILES] {
-        let mut surprises: [Vec<f32>; QUANTILES] = Default::default();
-        let mut pass = Pass::default();
-        for sample in &self.validation {
-            self.network.forward(parameters, &[sample], &mut pass);
-            let target = (worst_um(sample, &pass.out) / sample.depth_um).ln();
-            for (surprises, quantile) in surprises.iter_mut().zip(&pass.quantile) {
-                surprises.push(target - quantile);
-            }
-        }
-        surprises
-    }
-
-    /// Quantiles of the worst node's error over the depth, in the core's bins of tip and strain, conformal as the shifts are.
-    fn prior(&self, parameters: &[f32]) -> Vec<f32> {
-        let mut bins = vec![Vec::new(); TIP_BINS * (PRIOR_STRAINS.len() + 1)];
-        let mut pass = Pass::default();
-        for sample in &self.validation {
-            self.network.forward(parameters, &[sample], &mut pass);
-            let bin = usize::from(sample.edged) * (PRIOR_STRAINS.len() + 1) + strain_bin(sample.strain);
-            bins[bin].push(worst_um(sample, &pass.out) / sample.depth_um);
-        }
-        let all: Vec<f32> = bins.concat();
-        // A bin with too few samples for a bound has that of all samples twice over.
-        bins.into_iter()
-            .flat_map(|ratios| {
-                LEVELS.map(|level| conformal(ratios.clone(), level).or(conformal(all.clone(), level).map(|q| 2.0 * q)))
-            })
-            .map(|quantile| quantile.unwrap_or(1.0))
-            .collect()
-    }
-
-    /// What has to be added to the quantiles' logarithms so that they hold on the validation split: of n surprises the ⌈p (n + 1)⌉-th smallest
-    /// (conformalised quantile regression: Romano, Patterson & Candès 2019).
-    fn shifts(&self, parameters: &[f32]) -> Vec<f32> {
-        let shift = |(surprises, level): (Vec<f32>, f32)| {
-            let largest = surprises.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-            conformal(surprises, level).unwrap_or(largest)
-        };
-        self.surprises(parameters).into_iter().zip(LEVELS).map(shift).collect()
-    }
-
     /// What the trainer computes for the first sample of the validation split.
     pub fn parity(&self, parameters: &[f32]) -> Option<Parity> {
         let sample = self.validation.first()?;
         let mut pass = Pass::default();
         self.network.forward(parameters, &[sample], &mut pass);
         let sum = |numbers: &[f32]| numbers.iter().map(|&number| f64::from(number)).sum();
-        let shifted = pass.quantile.iter().zip(self.shifts(parameters)).map(|(quantile, shift)| quantile + shift);
+        let shifts = bounds::shifts(&bounds::judge(&self.network, parameters, &self.validation));
+        let shift = &shifts[strain_bin(sample.strain) * QUANTILES..];
+        let shifted = pass.quantile.iter().zip(shift).map(|(quantile, shift)| quantile + shift);
         Some(Parity {
             features: [sum(&sample.local), sum(&sample.global)],
             quantiles: shifted.collect(),
@@ -122,6 +75,7 @@ impl ContactLearner {
 
     /// All tensors of the weights.
     pub fn tensors(&self, parameters: &[f32]) -> Vec<Named> {
+        let judged = bounds::judge(&self.network, parameters, &self.validation);
         let named = |name: &str, numbers: &[f32]| (name.to_owned(), vec![numbers.len()], numbers.to_vec());
         let mut tensors: Vec<Named> = self
             .network
@@ -137,10 +91,9 @@ impl ContactLearner {
             named("normaliser.global.scale", &self.global.scale),
             named("range.global.low", &self.global.low),
             named("range.global.high", &self.global.high),
-            named("quantile.shift", &self.shifts(parameters)),
+            ("quantile.shift".to_owned(), vec![STRAIN_BINS, QUANTILES], bounds::shifts(&judged)),
+            ("prior".to_owned(), vec![TIP_BINS, STRAIN_BINS, QUANTILES], bounds::prior(&judged)),
         ]);
-        let prior = vec![TIP_BINS, PRIOR_STRAINS.len() + 1, QUANTILES];
-        tensors.push(("prior".to_owned(), prior, self.prior(parameters)));
         tensors
     }
 }

@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use retina_core::network::weights::{HASH, NETWORK, hash};
+use retina_core::network::weights::hash;
+pub use retina_core::network::weights::{HASH, NETWORK};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensorError};
 

@@ -1,4 +1,4 @@
-//! What accuracy costs in time: every level and every knob of level `coarse` against the reference, in one run on one thread.
+//! What accuracy costs in time: every level, and every knob of levels `network` and `coarse`, against the reference, in one run on one thread.
 //!
 //! `cargo run --release -p retina-tests --bin accuracy [-- REQUESTS [SEED]]` writes `docs/accuracy/report.md`, `results.json` and `chart.svg`. Requests are those
 //! of each of three panels (default, hard, outside); a reference takes seconds, so 30 a panel take about ten minutes on a quiet machine. Where `docs/accuracy/before.json` holds the results of an earlier program, they are shown

@@ -26,8 +26,9 @@ const ERROR_MARKS: [(f64, &str); 2] = [(3.3, "OCT pixel 3.3 µm"), (9.0, "tool-t
 const TIME_MARKS: [(f64, &str); 2] = [(1.0, "haptics 1 ms"), (33.0, "display 33 ms")];
 
 /// Colours of the knobs.
-const COLOURS: [(&str, &str); 5] = [
+const COLOURS: [(&str, &str); 6] = [
     ("level", "#c02942"),
+    ("width", "#d98c00"),
     ("mesh", "#2a6f97"),
     ("tolerance", "#6a994e"),
     ("contact", "#9c6644"),

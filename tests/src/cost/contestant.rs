@@ -1,12 +1,15 @@
-//! Contestants: the levels, and level `coarse` with one knob turned.
+//! Contestants: the levels, level `network` with networks of other widths, and level `coarse` with one knob turned.
+
+use std::sync::Arc;
 
 use retina_core::equilibrium::ContactSettings;
 use retina_core::predict::finite_element::{COARSE, REFERENCE, Resolution};
+use retina_core::predict::networks::Networks;
 use retina_core::predict::{EffectChoice, Level, PredictError, Prediction, PreparedScene, Request, Workspace};
 use retina_core::progress::Silent;
 
 /// One way to answer a request.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone)]
 pub struct Contestant {
     /// Its name in reports.
     pub name: String,
@@ -15,16 +18,30 @@ pub struct Contestant {
     level: Level,
     /// In place of the level's own, where a knob of the mesh or the solver is turned.
     resolution: Option<Resolution>,
+    /// In place of those that ship.
+    networks: Option<Arc<Networks>>,
     effects: EffectChoice,
 }
 
 impl Contestant {
     /// A level as the service has it.
     pub fn level(level: Level) -> Self {
-        Self { name: level.name().to_owned(), knob: "level", level, resolution: None, effects: EffectChoice::Auto }
+        Self {
+            name: level.name().to_owned(),
+            knob: "level",
+            level,
+            resolution: None,
+            networks: None,
+            effects: EffectChoice::Auto,
+        }
     }
 
-    /// Its answer.
+    /// The scene that it answers on, where that is not the one asked about.
+    pub fn scene(&self, asked: &PreparedScene) -> Option<PreparedScene> {
+        self.networks.as_ref().map(|networks| asked.with_networks(networks.clone()))
+    }
+
+    /// Its answer on [`Contestant::scene`].
     ///
     /// # Errors
     /// What the level refuses or fails.
@@ -50,10 +67,25 @@ const TOLERANCES: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-5];
 /// Contact stiffnesses over that of `coarse`.
 const STIFFNESSES: [f64; 3] = [0.03, 0.3, 3.0];
 
-/// Everybody but the reference: the levels, then the knobs of level `coarse`.
+/// Networks trained as the one that ships (160 wide), but for their width.
+const WIDTHS: [(usize, &[u8]); 2] = [
+    (24, include_bytes!("../../../models/weights/contact-24.safetensors")),
+    (64, include_bytes!("../../../models/weights/contact-64.safetensors")),
+];
+
+/// Everybody but the reference: the levels, networks of other widths, then the knobs of level `coarse`.
 pub fn contestants() -> Vec<Contestant> {
     let levels = Level::ALL.into_iter().filter(|&level| level != Level::Reference).map(Contestant::level);
-    levels.chain(knobs()).collect()
+    levels.chain(WIDTHS.map(width)).chain(knobs()).collect()
+}
+
+fn width((width, weights): (usize, &[u8])) -> Contestant {
+    Contestant {
+        name: format!("width {width}"),
+        knob: "width",
+        networks: Some(Arc::new(Networks::read(weights, &[]))),
+        ..Contestant::level(Level::Network)
+    }
 }
 
 fn knobs() -> Vec<Contestant> {

@@ -159,6 +159,8 @@ impl Tally {
         repeats: usize,
         workspace: &mut Workspace,
     ) {
+        let own = contestant.scene(scene);
+        let scene = own.as_ref().unwrap_or(scene);
         let mut timed = || {
             let begun = Instant::now();
             let answer = contestant.answer(scene, request, workspace);

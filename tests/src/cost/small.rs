@@ -10,7 +10,7 @@ use super::measure::{Standing, Tally};
 use crate::held_out::{HeldOut, PATH, prepare};
 
 /// Knobs that cost no more than a few times level `coarse`.
-const QUICK: [&str; 3] = ["level", "tolerance", "contact"];
+const QUICK: [&str; 4] = ["level", "width", "tolerance", "contact"];
 
 /// Everybody quick on every held-out request, each answer timed `repeats` times.
 ///
