@@ -8,6 +8,7 @@ use retina_core::network::contact::{QUANTILES, STRAIN_BINS, TIP_BINS, strain_bin
 use super::loss::{LEVELS, worst_um};
 use super::network::{Network, Pass};
 use super::prepared::Prepared;
+use crate::train::export::Named;
 
 /// What the network made of one sample.
 pub struct Judged {
@@ -55,7 +56,7 @@ pub fn shifts(judged: &[Judged]) -> Vec<f32> {
 
 /// Quantiles of the worst node's error over the depth, in the core's bins of tip and strain, conformal as the shifts are. A bin with too few samples for
 /// a bound has that of all samples twice over.
-pub fn prior(judged: &[Judged]) -> Vec<f32> {
+fn prior(judged: &[Judged]) -> Vec<f32> {
     let mut bins = vec![Vec::new(); TIP_BINS * STRAIN_BINS];
     for one in judged {
         bins[usize::from(one.edged) * STRAIN_BINS + one.strain_bin].push(one.ratio);
@@ -67,4 +68,12 @@ pub fn prior(judged: &[Judged]) -> Vec<f32> {
         })
         .map(|quantile| quantile.unwrap_or(1.0))
         .collect()
+}
+
+/// The bounds as the weights have them.
+pub fn tensors(judged: &[Judged]) -> [Named; 2] {
+    [
+        ("quantile.shift".to_owned(), vec![STRAIN_BINS, QUANTILES], shifts(judged)),
+        ("prior".to_owned(), vec![TIP_BINS, STRAIN_BINS, QUANTILES], prior(judged)),
+    ]
 }

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use rayon::prelude::*;
-use retina_core::network::contact::{QUANTILES, STRAIN_BINS, Start, TIP_BINS, strain_bin};
+use retina_core::network::contact::{QUANTILES, Start, strain_bin};
 use retina_core::network::features::Features;
 
 use super::bounds;
@@ -91,9 +91,8 @@ impl ContactLearner {
             named("normaliser.global.scale", &self.global.scale),
             named("range.global.low", &self.global.low),
             named("range.global.high", &self.global.high),
-            ("quantile.shift".to_owned(), vec![STRAIN_BINS, QUANTILES], bounds::shifts(&judged)),
-            ("prior".to_owned(), vec![TIP_BINS, STRAIN_BINS, QUANTILES], bounds::prior(&judged)),
         ]);
+        tensors.extend(bounds::tensors(&judged));
         tensors
     }
 }

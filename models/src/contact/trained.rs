@@ -1,7 +1,7 @@
 //! A trained contact network as its weight file has it: to compute its layers as the trainer does, and to set its bounds right anew.
 
-use retina_core::network::contact::{QUANTILES, STRAIN_BINS, Start, TIP_BINS};
-use retina_core::network::weights::{Weights, WeightsError};
+use retina_core::network::contact::Start;
+use retina_core::network::weights::{HASH, NETWORK, Weights, WeightsError};
 use safetensors::{SafeTensorError, SafeTensors};
 
 use super::bounds;
@@ -20,10 +20,6 @@ pub struct Trained {
     local: Normaliser,
     global: Normaliser,
 }
-
-/// Names of the tensors that [`Trained::with_bounds`] writes anew.
-const SHIFT: &str = "quantile.shift";
-const PRIOR: &str = "prior";
 
 impl Trained {
     /// From weights.
@@ -67,19 +63,19 @@ impl Trained {
         data: &str,
     ) -> Result<Vec<u8>, SafeTensorError> {
         let judged = bounds::judge(&self.network, &self.parameters, samples);
+        let anew = bounds::tensors(&judged);
         let kept = SafeTensors::deserialize(file)?;
         let mut tensors: Vec<Named> = kept
             .tensors()
             .into_iter()
-            .filter(|(name, _)| name != SHIFT && name != PRIOR)
+            .filter(|(name, _)| anew.iter().all(|(written, ..)| written != name))
             .map(|(name, tensor)| (name, tensor.shape().to_vec(), numbers(tensor.data())))
             .collect();
-        tensors.push((SHIFT.to_owned(), vec![STRAIN_BINS, QUANTILES], bounds::shifts(&judged)));
-        tensors.push((PRIOR.to_owned(), vec![TIP_BINS, STRAIN_BINS, QUANTILES], bounds::prior(&judged)));
+        tensors.extend(anew);
         let (_, header) = SafeTensors::read_metadata(file)?;
         let told = header.metadata().clone().unwrap_or_default();
         let mut about: Vec<(&str, String)> = told.iter().map(|(key, value)| (key.as_str(), value.clone())).collect();
-        about.retain(|(key, _)| ![export::HASH, export::NETWORK, BOUNDS].contains(key));
+        about.retain(|(key, _)| ![HASH, NETWORK, BOUNDS].contains(key));
         about.push((BOUNDS, data.to_owned()));
         export::weights(start.network(), &tensors, &about)
     }

@@ -2,8 +2,7 @@
 
 use std::collections::HashMap;
 
-use retina_core::network::weights::hash;
-pub use retina_core::network::weights::{HASH, NETWORK};
+use retina_core::network::weights::{HASH, NETWORK, hash};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensorError};
 
